@@ -121,10 +121,13 @@ def to_options(table: Mapping[str, Any], options_type: type[Options], path: Path
     FileFormatError
         If keys or values do not fit: names every one of them.
     """
+    kind: Any = options_type
     try:
-        return _adapter(options_type).validate_python(dict(table))
+        options: Options = _adapter(kind).validate_python(dict(table))
     except ValidationError as error:
         problems = _problems(error, options_type)
+    else:
+        return options
     if len(problems) == 1:
         ((where, problem),) = problems.items()
         raise FileFormatError(path, problem, where=where)
@@ -158,8 +161,8 @@ def check_values(options: object) -> None:
 
 
 @lru_cache
-def _adapter(options_type: type[Options]) -> TypeAdapter[Options]:
-    return TypeAdapter(options_type)
+def _adapter(kind: type) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
 
 
 @lru_cache

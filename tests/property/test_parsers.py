@@ -151,3 +151,17 @@ def test_anything_is_read_or_refused(name, data):
     refusal = refusal_of(name, content)
     assert refusal is None or name in refusal  # the file is named
     assert "\n" not in (refusal or "")
+
+
+FOUND = [  # by a longer search
+    ("recording.uff", (0.26953125, 0, b"\n")),
+    ("frf.csv", (0.0, 0, b"0;")),
+    ("frf.csv", (0.5700660287258991, 14, b"1e300")),
+]
+
+
+@pytest.mark.parametrize(("name", "change"), FOUND)
+def test_what_a_longer_search_has_found_is_refused(name, change):
+    refusal = refusal_of(name, edited(PARSERS[name][0].encode(), [change]))
+    assert refusal is not None
+    assert name in refusal

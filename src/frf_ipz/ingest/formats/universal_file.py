@@ -305,7 +305,7 @@ def _read_axis(lines: _Lines) -> Axis:
     line = lines.take()
     fields = _split_by_widths(line, (10, 5, 5, 5, 1, 20, 1, 20))
     data_type = _integers(fields[:1])
-    if data_type is None:
+    if not data_type:
         raise lines.fault(f"'{line.strip()}' does not begin with the type of an axis")
     return Axis(data_type=data_type[0], label=line[26:46].strip(), unit=line[47:].strip())
 
