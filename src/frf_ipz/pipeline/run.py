@@ -43,8 +43,9 @@ def run_pipeline(
         The last stage to run: ``ingest``, ``fit``, ``diagnose``, ``pair``, ``update``, ``predict``, ``export`` or
         ``report``.
     diagnosing : bool, optional
-        Look for what the model left out, without a limit of time unless one is stated; where it is left out,
-        ``[diagnose] run`` says whether, and the time is limited.
+        Look for what the model left out, without a limit of time unless one is stated; False: do not, and take what
+        was found of these very inputs before. Where it is left out, ``[diagnose] run`` says whether, and the time is
+        limited.
     progress : Progress
         Called with the fraction done and what is being done.
 

@@ -225,3 +225,44 @@ def test_a_run_takes_over_what_a_diagnosis_in_any_time_has_found(campaign, monke
     path.write_text(text.replace('run = "never"', 'run = "auto"\napply = true'), encoding="utf-8")
     frf_ipz.run_pipeline(path, out, until="predict")
     assert len(searches) == 2
+
+
+def test_what_was_found_counts_as_long_as_nothing_changes_that_it_rests_on(campaign, monkeypatch):
+    """And no search is made for that, whatever was asked for."""
+    searches = []
+
+    def find_causes(*_, **__):
+        searches.append(1)
+        return replace(synthetic_folder(diagnosed=True).results["diagnose"], verdict="consistent", findings=())
+
+    monkeypatch.setattr(mismatch, "find_causes", find_causes)
+    path, out = campaign / "pipeline.toml", campaign / "out"
+    frf_ipz.run_pipeline(path, out, diagnosing=True)
+    text = path.read_text(encoding="utf-8")
+
+    def run(**values):
+        changed = text
+        for old, new in values.values():
+            assert old in text
+            changed = changed.replace(old, new)
+        path.write_text(changed, encoding="utf-8")
+        results = frf_ipz.run_pipeline(path, out, diagnosing=False)
+        says = [check.says for check in results.assessment.checks if check.name == "diagnosis"]
+        return results, says, (out / "report.html").read_text(encoding="utf-8")
+
+    results, says, _ = run()
+    assert says == ["nothing significant is missing in the model"]
+    results, says, _ = run(point=('"11:+z"', '"10:+z"'))
+    assert says == ["nothing significant is missing in the model"]
+    assert not results.stale
+    results, says, page = run(band=("600.0", "550.0"))
+    assert says == ["not looked for"]
+    assert results.stale == {"diagnose", "levels"}
+    assert "Not looked for since the last change. Before it: " in page
+    assert "<dd>not looked for</dd><dd>since the last change</dd>" in page
+    assert "Nothing significant is missing" not in page.split('<section id="diagnosis"')[0]
+    results, says, page = run()
+    assert says == ["nothing significant is missing in the model"]
+    assert not results.stale
+    assert "since the last change" not in page
+    assert len(searches) == 1

@@ -55,6 +55,8 @@ def build(run: Results) -> Section | None:
         *_detectability(diagnosis),
     )
     lead = typeset(diagnosis.statement) or verdict_of(diagnosis)[0]
+    if "diagnose" in run.stale:
+        lead = f"Not looked for since the last change. Before it: {lead}"
     notes = (
         *mismatch_sentence(diagnosis),
         *[ambiguity.statement for ambiguity in diagnosis.ambiguity],

@@ -76,7 +76,7 @@ def verdict(run: Results) -> tuple[str, str]:
         The verdict in a sentence, and what there is to add.
     """
     parts = [] if run.assessment is None else [assessment_sentence(run.assessment)]
-    parts += list(verdict_of(run.diagnosis)) if run.diagnosis is not None else []
+    parts += list(verdict_of(run.diagnosis)) if run.diagnosis is not None and "diagnose" not in run.stale else []
     if run.updated_model is not None and run.pairs is not None:
         parts.append(_of_update(run))
     elif run.fit is not None:
@@ -237,6 +237,8 @@ def _target_card(run: Results) -> Card:
 
 
 def _missing_card(run: Results) -> Card:
+    if "diagnose" in run.stale:
+        return Card("Missing in the model", "not looked for", "since the last change")
     if run.diagnosis is not None:
         figure, meaning = card_texts(run.diagnosis)
         return Card("Missing in the model", figure, meaning)
