@@ -133,7 +133,7 @@ FIT = (
     Column("misfit", "float", "SI of the quantity per N", "root mean square of measured minus fitted"),
     Column("noise", "float", "SI of the quantity per N", "root mean square of the noise"),
     Column("ratio", "float", "1", "root mean square of misfit over noise, line by line"),
-    Column("delay_s", "float", "s", "fitted delay of the FRF; 0 unless [fit] delay = true"),
+    Column("delay_s", "float", "s", "delay of the FRF that the fit took off: 0 without one"),
     Column("gain", "float", "1", "measured FRF over the true one; 1 unless [fit] gain names one of its channels"),
     Column("gain_std", "float", "1", "standard deviation of the gain"),
 )
