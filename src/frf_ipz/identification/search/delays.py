@@ -107,13 +107,15 @@ def common_delay(
     one_channel = np.zeros(n_frfs, np.int64)
     normal, noise = _normal(lines), 2.0 * lines.receptance.size
     left = _misfit(normal, poles, terms)
-    demanded = np.log(noise)  # by the BIC, for one number more
+    by_number = float(np.log(2 * len(lines.s)))  # demanded by the BIC for each number more
+    if left - _misfit(replace(normal, real_modes=False), poles, terms) < len(poles) * n_frfs * by_number:
+        return None  # modes are normal
     delay = 0.0
     for _ in range(ROUNDS):
         delay = float(find_delays(normal, poles, terms, one_channel)[0])
         late = _normal(lines.advanced(np.full(n_frfs, delay)))
         gain = left - _misfit(late, poles, terms)
-        if gain < demanded or gain < MOST * (left - noise):
+        if gain < by_number or gain < MOST * (left - noise):
             return None
         poles = find_poles(lines.advanced(np.full(n_frfs, delay)))
     late = _normal(lines.advanced(np.full(n_frfs, delay)))
