@@ -43,6 +43,7 @@ RECORD = (
     Column("slowest_mode_hz", "float", "Hz", "frequency of that mode"),
     Column("snr_db", "float", "dB", "power of the response over its noise, median of the channels; null if unknown"),
     Column("force_noise_N", "float", "N", "standard deviation of the force outside of its pulse; null for a shaker"),
+    Column("force_band_hz", "float", "Hz", "up to where the force's spectrum stays within 20 dB of its largest value"),
     Column("step_s", "float", "s", "time step of the file"),
     Column("samples", "int", "1", "number of samples"),
     Column("trigger_s", "float", "s", "time from its start at which the force sets in"),
