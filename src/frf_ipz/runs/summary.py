@@ -58,6 +58,8 @@ def summarise(results: Results) -> str:
         if result is not None:
             stale = " (stale: made before the last change; run it again)" if stage in results.stale else ""
             lines += [f"{title:<12}{text}{stale}" for title, text in write(result)]
+    notes = results.manifest.get("notes", [])
+    lines += [f"{'' if place else 'mended':<12}{note}" for place, note in enumerate(notes)]
     seconds = sum(entry.get("seconds", 0.0) for entry in results.manifest.get("stages", {}).values())
     lines.append(f"{'results':<12}{results.path or 'in memory'}  ({seconds:.1f} s of computing)")
     if results.path is not None and "report" in results.stages and "report" not in results.stale:
