@@ -118,15 +118,6 @@ def test_ticks_of_frequency_axes_are_whole_numbers_and_few(page, zoom):
             assert numbers == [20, 50, 100, 200, 500]
 
 
-def test_ticks_of_the_magnitude_are_no_digits_of_powers(page):
-    for figure in ("frf", "targets"):
-        ticks = page.execute_script(
-            f"return [...document.querySelectorAll('#{figure} .ytick text')].map((t) => t.textContent)"
-        )
-        assert ticks
-        assert not {"2", "5"} & set(ticks) or {"20", "10", "1"} & set(ticks), ticks
-
-
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_nothing_is_wider_than_a_narrow_screen(browser, written, page, theme):
     resize(page, 390)
