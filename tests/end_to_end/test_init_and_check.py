@@ -238,6 +238,22 @@ def test_check_names_what_is_wrong_with_the_recordings(campaign, change, says):
     assert re.search(says, open_points(text)[0])
 
 
+@pytest.mark.parametrize(
+    ("file", "change", "says"),
+    [
+        ("test", ('dof = "21:+z"', 'dof = "4:+z"'), "test.toml: the frequencies agree"),
+        ("model", ("length_m = 0.5", "length_m = 0.61"), "model.toml"),
+    ],
+    ids=["shapes", "length"],
+)
+def test_check_says_what_does_not_agree(campaign, file, change, says):
+    """One sensor that is elsewhere could be many things: its unit, its place, the place of the impacts."""
+    rewrite(campaign / f"{file}.toml", change)
+    text = look(campaign)
+    assert FITS not in text
+    assert open_points(text)[0].startswith(says)
+
+
 def test_check_says_that_a_point_of_interest_is_measured(campaign):
     rewrite(campaign / "pipeline.toml", ('points = ["11:+z"]', 'points = ["11:+z", "21:-z"]'))
     (point,) = open_points(look(campaign))
