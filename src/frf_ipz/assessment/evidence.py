@@ -45,8 +45,12 @@ class Evidence:
         Measured FRFs at points of interest that were kept aside.
     diagnosis : Diagnosis, optional
         What the FE model left out; None where it was not looked for.
+    is_corrected : bool
+        What the diagnosis found is in the model that predicts.
     impacts : tuple of Trace
         Forces and responses of a hammer's impacts; empty for other tests.
+    is_recorded : bool
+        The FRFs were estimated from columns of recordings.
     test_file, model_file : str
         Where a mistake would stand.
     """
@@ -59,7 +63,9 @@ class Evidence:
     prediction: Prediction
     reference: FrfSet | None = None
     diagnosis: Diagnosis | None = None
+    is_corrected: bool = False
     impacts: tuple[Trace, ...] = ()
+    is_recorded: bool = False
     test_file: str = "test.toml"
     model_file: str = "model.toml"
 
@@ -70,8 +76,9 @@ class Evidence:
 
     @cached_property
     def measured(self) -> ComplexArray:
-        """(n_lines, n_frfs) measured FRFs on these lines."""
-        return np.asarray(self.frfs.values[self.lines])
+        """(n_lines, n_frfs) measured FRFs on these lines, without the delay that was fitted."""
+        late = np.exp(self.frfs.s[self.lines, None] * self.fit.model.delay_s)
+        return np.asarray(self.frfs.values[self.lines] * late)
 
     @cached_property
     def noise(self) -> FloatArray:
@@ -80,7 +87,7 @@ class Evidence:
         Where the recordings do not tell, what the fit leaves over stands in for it.
         """
         stated = np.sqrt(self.frfs.variance[self.lines])
-        left_over = np.abs(self.measured - self.fit.model(self.frfs.s[self.lines]))
+        left_over = np.abs(self.frfs.values[self.lines] - self.fit.model(self.frfs.s[self.lines]))
         known = np.isfinite(stated)
         return np.where(known, np.where(known, stated, 0.0), np.sqrt(np.mean(left_over**2, axis=0)))
 

@@ -152,8 +152,10 @@ def diagnosis(evidence: Evidence) -> Iterator[Check]:
     elif found.verdict == "unexplained":
         says, verdict = "something is missing in the model that no known effect explains", Verdict.WITH_CARE
         advice = "see the section on the diagnosis"
+    elif found.verdict == "explained" and evidence.is_corrected:
+        says, verdict, advice = "what is missing in the model was found, and put into it", Verdict.USABLE, ""
     elif found.verdict == "explained":
-        says, verdict = "what is missing in the model was found", Verdict.USABLE
+        says, verdict = "what is missing in the model was found; the prediction is made without it", Verdict.WITH_CARE
         advice = "put it into the model, or set [diagnose] apply = true"
     else:
         says, verdict, advice = "nothing significant is missing in the model", Verdict.USABLE, ""
