@@ -189,7 +189,8 @@ def _candidates(
         for dof in updated_model.expanded_dofs
         if dof.direction in directions and dof != predicted.output_dof.unsigned
     ]
-    dofs = [dofs[index] for index in np.unique(np.linspace(0, len(dofs) - 1, MAX_CANDIDATES).astype(int))]
+    kept = np.unique(np.linspace(0, len(dofs) - 1, MAX_CANDIDATES).astype(int)) if dofs else ()
+    dofs = [dofs[index] for index in kept]
     measured_pairs = {(label.output_dof.unsigned, label.input_dof.unsigned) for label in measured}
     further = [(f"a sensor at {dof.name}", dof, excited[0]) for dof in dofs]
     further += [(f"an excitation at {dof.name}", sensors[0], dof) for dof in dofs]
