@@ -54,7 +54,8 @@ def assess(evidence: Evidence) -> Assessment:
         Verdict, checks and likely cause.
     """
     checks = [check for ask in CHECKS for check in ask(evidence)]
-    return Assessment.of_checks(checks, likely_cause(evidence))
+    deviations = tuple(found for found in (evidence.point_deviation, evidence.deviation) if found is not None)
+    return Assessment.of_checks(checks, likely_cause(evidence), deviations=deviations)
 
 
 def likely_cause(evidence: Evidence) -> LikelyCause | None:

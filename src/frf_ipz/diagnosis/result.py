@@ -505,6 +505,11 @@ class Diagnosis(Tabulated, Drawn):
         """False where the time did not suffice for the whole search."""
         return not self.not_searched
 
+    @property
+    def is_explained(self) -> bool:
+        """True where nothing remains that the findings and the measured damping do not explain."""
+        return not (self.verdict == "unexplained" and self.unexplained_part)
+
     def __repr__(self) -> str:
         effects = ", ".join(finding.effect for finding in self.findings) or "no finding"
         return f"Diagnosis: {self.verdict}, {effects}"

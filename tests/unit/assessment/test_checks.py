@@ -10,7 +10,8 @@ import frf_ipz
 from clamped_beam import BEAM
 from frf_ipz.assessment.assess import assess
 from frf_ipz.assessment.checks import agreement, counterparts, prediction, quality
-from frf_ipz.assessment.evidence import Evidence, fitted_gains
+from frf_ipz.assessment.evidence import Evidence
+from frf_ipz.assessment.measured_points import fitted_gains
 from frf_ipz.pairing.pairs import PairVerdict
 
 OUTPUTS, INPUTS, POINT = ("9:+z", "16:+z", "21:+z"), ("12:+z",), "18:+z"

@@ -85,6 +85,7 @@ def assess(
     prediction: Prediction,
     *,
     diagnosis: Diagnosis | None,
+    with_causes: Prediction | None = None,
 ) -> Assessment:
     """Say whether the result can be used, in `run.json` too.
 
@@ -108,6 +109,8 @@ def assess(
         FRFs at the points of interest.
     diagnosis : Diagnosis, optional
         What the model left out; None where it was not looked for.
+    with_causes : Prediction, optional
+        FRFs at the points of interest of a model that has what the diagnosis found.
 
     Returns
     -------
@@ -116,7 +119,7 @@ def assess(
     """
     inputs = runner.inputs
     named = {"test_file": inputs.test.path.name, "model_file": Path(next(iter(inputs.model_names), "FE model")).name}
-    optional = {"diagnose": diagnosis, "reference": inputs.reference}
+    optional = {"diagnose": diagnosis, "reference": inputs.reference, "causes": with_causes}
     rests_on = ("predict", *(name for name, result in optional.items() if result is not None))
     assessment = runner.stage(
         "assess",
@@ -131,6 +134,7 @@ def assess(
                 prediction=prediction,
                 reference=inputs.reference,
                 diagnosis=diagnosis,
+                with_causes=with_causes,
                 impacts=traces if inputs.test.kind == "hammer" else (),
                 **named,
             )
