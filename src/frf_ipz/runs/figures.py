@@ -21,6 +21,8 @@ FULL_COHERENCE = 0.99995  # rounds to 1.0000, which no measurement has
 def deviation_of(run: Results) -> FrfDeviation | None:
     """Give how far the models are from what was measured: at a point of interest, else at the measured points.
 
+    It is what the assessment says; worked out anew where there is none.
+
     Parameters
     ----------
     run : Results
@@ -31,8 +33,10 @@ def deviation_of(run: Results) -> FrfDeviation | None:
     FrfDeviation or None
         None where there is nothing to compare.
     """
+    if run.assessment is not None:
+        return next(iter(run.assessment.deviations), None)
     if run.prediction is not None:
-        at_points = point_deviation(run.prediction, frfs=run.frfs, reference=run.reference, with_causes=run.with_causes)
+        at_points = point_deviation(run.prediction, frfs=run.frfs, reference=run.reference)
         if at_points is not None:
             return at_points
     if run.frfs is None or run.fit is None or run.updated_model is None:

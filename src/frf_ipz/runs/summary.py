@@ -221,10 +221,14 @@ def diagnosis_lines(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     list of pairs of str
         Title and text of each line.
     """
-    statement = diagnosis.statement
-    findings = [("", finding.statement) for finding in diagnosis.findings if finding.statement not in statement]
-    ambiguities = [("", ambiguity.statement) for ambiguity in diagnosis.ambiguity]
-    return [("diagnosis", statement), *findings, *ambiguities, *_notes(diagnosis.warnings)]
+    findings = [finding.statement for finding in diagnosis.findings]
+    verdict = diagnosis.statement
+    for statement in (*findings, *diagnosis.statements):  # each on a line of its own
+        verdict = " ".join(verdict.replace(statement, "").split())
+    texts = [*findings, verdict] if diagnosis.is_explained else [verdict, *findings]
+    texts += [*diagnosis.statements, *(ambiguity.statement for ambiguity in diagnosis.ambiguity)]
+    lines = [("" if place else "diagnosis", text) for place, text in enumerate(filter(None, texts))]
+    return [*lines, *_notes(diagnosis.warnings)]
 
 
 def reduced_lines(reduced: ReducedModel) -> list[tuple[str, str]]:

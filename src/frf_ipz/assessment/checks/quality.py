@@ -143,11 +143,12 @@ def diagnosis(evidence: Evidence) -> Iterator[Check]:
     found = evidence.diagnosis
     if found is None:
         says, verdict, advice = "not looked for", Verdict.USABLE, "frf-ipz diagnose looks for what the model leaves out"
-    elif found.verdict == "unexplained":
+    elif not found.is_explained:
         says, verdict = "something is missing in the model that no known effect explains", Verdict.WITH_CARE
         advice = "see the section on the diagnosis"
-    elif found.verdict == "explained":
-        says, verdict = "what is missing in the model was found", Verdict.USABLE
+    elif found.findings:
+        names = ", ".join(f"{finding.effect.replace('_', ' ')} ({finding.confidence})" for finding in found.findings)
+        says, verdict = f"what is missing in the model was found: {names}", Verdict.USABLE
         advice = "put it into the model, or set [diagnose] apply = true"
     else:
         says, verdict, advice = "nothing significant is missing in the model", Verdict.USABLE, ""

@@ -50,9 +50,7 @@ def build(run: Results) -> Section | None:
         anchor="frfs",
         title="FRFs",
         lead=lead,
-        blocks=tuple(
-            run_figures(run, "frfs", hints={"frf": ZOOM_HINT}, tables={"frf": _table(frfs, fitted_lines(run))})
-        ),
+        blocks=tuple(run_figures(run, "frfs", hints={"frf": ZOOM_HINT}, tables={"frf": table})),
     )
 
 

@@ -10,6 +10,7 @@ from frf_ipz.plotting.wording import counted, listed, number
 from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.prediction.reference import measured_at
 from frf_ipz.report.section import Section, Table, run_figures
+from frf_ipz.runs.figures import deviation_of
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray
@@ -42,9 +43,15 @@ def build(run: Results) -> Section | None:
         anchor="prediction",
         title="Points of interest",
         lead=lead,
-        blocks=(*run_figures(run, "prediction"), _table(prediction, known, run.with_causes)),
+        blocks=(*run_figures(run, "prediction"), _table(prediction, known, run.with_causes if _counts(run) else None)),
         notes=prediction.warnings,
     )
+
+
+def _counts(run: Results) -> bool:
+    """Tell whether the last run has looked at what the causes do: those of an older one may still be kept."""
+    deviation = deviation_of(run)
+    return deviation is not None and bool(np.isfinite(deviation.with_causes_db))
 
 
 def _table(prediction: Prediction, known: dict[int, ComplexArray], with_causes: Prediction | None) -> Table:
