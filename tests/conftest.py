@@ -8,6 +8,7 @@ from hypothesis import settings
 
 settings.register_profile("ci", derandomize=True, deadline=None)  # every run tries the same examples
 settings.register_profile("dev", deadline=None)
+settings.register_profile("long", deadline=None, max_examples=10_000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 SHARED = Path(__file__).parents[2] / "shared"
 

@@ -23,6 +23,6 @@ def make_demo(folder):
 def copy_demo(made, folder):
     """Copy it; the copy's results name the copy's pipeline file."""
     shutil.copytree(made, folder, dirs_exist_ok=True)
-    manifest = folder / "out" / "run.json"
-    manifest.write_text(manifest.read_text(encoding="utf-8").replace(str(made), str(folder)), encoding="utf-8")
+    for manifest in (folder / "out").rglob("run.json"):  # what users open, and that of the generation
+        manifest.write_text(manifest.read_text(encoding="utf-8").replace(str(made), str(folder)), encoding="utf-8")
     return folder

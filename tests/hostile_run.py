@@ -51,6 +51,7 @@ def hostile_folder():
         "when": HOSTILE,
         "pipeline": HOSTILE,
         "name": HOSTILE,
+        "test": dict.fromkeys(("operator", "date", "equipment", "customer", "serial_number"), HOSTILE),
         "configuration": {"fit": {HOSTILE: HOSTILE}},
         "inputs": {HOSTILE: HOSTILE},
         "stages": {**folder.manifest["stages"], HOSTILE: {"key": HOSTILE, "seconds": 1.0}},

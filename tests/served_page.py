@@ -18,14 +18,21 @@ return [box.left + xaxis._offset + xaxis.d2p(trace.x[k]), box.top + yaxis._offse
 
 
 @contextmanager
-def served(folder):
-    """Serve a folder by the command; gives the address of its page."""
+def serving(folder):
+    """Serve a folder by the command; gives the process and the address of its page."""
     command = [sys.executable, "-m", "frf_ipz.cli.main", "show", str(folder), "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
         try:
-            yield server.stdout.readline().strip()
+            yield server, server.stdout.readline().strip()
         finally:
             server.kill()
+
+
+@contextmanager
+def served(folder):
+    """Serve a folder by the command; gives the address of its page."""
+    with serving(folder) as (_, address):
+        yield address
 
 
 class Page:

@@ -54,7 +54,7 @@ def labels_of(n_outputs, n_inputs, quantity=FrfQuantity.ACCELERANCE):
     )
 
 
-def frf_set(frequency_hz, values, labels, variance=None):
+def frf_set(frequency_hz, values, labels, variance=None, *, window_decay_1_s=0.0):
     """Give an FrfSet; without a variance the noise is unknown."""
     unknown = np.full(values.shape, np.nan)
     return FrfSet(
@@ -64,6 +64,7 @@ def frf_set(frequency_hz, values, labels, variance=None):
         variance=unknown if variance is None else np.broadcast_to(variance, values.shape).copy(),
         coherence=unknown,
         averages=np.zeros(values.shape[1], int),
+        window_decay_1_s=window_decay_1_s,
     )
 
 

@@ -1,14 +1,21 @@
 """The one door through which files that others wrote are opened; what is wrong with one is said in one line.
 
 Only regular files are opened: a device never ends, a pipe waits for ever. No other module opens a file to read it.
+
+What a result depends on is known by digests of the files that it was made from. So that these are digests of what was
+read, and not of what somebody has saved in the meantime, a command keeps a `Ledger`: within `entering` each file that
+is opened is digested through the opening that is then read from, and one that is no longer what it was is refused.
 """
 
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import stat
 from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import FileFormatError
@@ -23,6 +30,111 @@ FOLDER = "is a folder, but a file is expected: name one inside it"
 MOST_TEXT_BYTES = 1 << 26  # of settings and tables that people write: two million lines
 BLOCK_BYTES = 1 << 20  # of a file that has more bytes than it says, as those of the system have
 MB = 1e6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ledger:
+    """What was in each file when it was read first.
+
+    Parameters
+    ----------
+    entries : dict of str to tuple
+        By the path of the file: the digest of its content, and the marks by which the system tells that it has changed.
+    """
+
+    entries: dict[str, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
+
+    def enter(self, path: Path, stream: BufferedReader) -> None:
+        """Digest what is about to be read.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        stream : BufferedReader
+            Its opening; stands at the beginning afterwards.
+
+        Raises
+        ------
+        FileFormatError
+            If it is no longer what it was.
+        """
+        marks = _marks(stream)
+        known, known_marks = self.entries.get(str(path), ("", ()))
+        if marks == known_marks:
+            return
+        content = hashlib.file_digest(stream, "sha256").hexdigest()
+        stream.seek(0)
+        if known not in {"", content}:
+            raise _changed(path)
+        self.entries[str(path)] = (content, marks)
+
+    def require_unchanged(self, path: Path, stream: BufferedReader) -> None:
+        """Refuse what was written to while it was read.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        stream : BufferedReader
+            Its opening.
+
+        Raises
+        ------
+        FileFormatError
+            If it is no longer what it was.
+        """
+        if _marks(stream) != self.entries[str(path)][1]:
+            raise _changed(path)
+
+
+LEDGER: ContextVar[Ledger | None] = ContextVar("LEDGER", default=None)
+
+
+@contextmanager
+def entering(ledger: Ledger) -> Iterator[None]:
+    """Enter every file that is read into a ledger.
+
+    Parameters
+    ----------
+    ledger : Ledger
+        With what was read before.
+
+    Yields
+    ------
+    None
+        While files are read.
+    """
+    token = LEDGER.set(ledger)
+    try:
+        yield
+    finally:
+        LEDGER.reset(token)
+
+
+def digest_file(path: Path) -> str:
+    """Digest a file's content; within `entering` what it was when it was read first.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
+
+    Raises
+    ------
+    FileFormatError
+        If it cannot be read, or is no longer what it was.
+    """
+    ledger = LEDGER.get()
+    with open_input(path) as stream:
+        if ledger is not None:
+            return ledger.entries[str(path)][0]
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def require_regular_file(path: Path) -> int:
@@ -97,8 +209,13 @@ def open_input(path: Path) -> Iterator[BufferedReader]:
         If it is missing, is no file, or cannot be read.
     """
     require_regular_file(path)
+    ledger = LEDGER.get()
     with _errors_of_system(path), path.open("rb") as stream:
+        if ledger is not None:
+            ledger.enter(path, stream)
         yield stream
+        if ledger is not None:
+            ledger.require_unchanged(path, stream)
 
 
 def read_bytes(path: Path, *, most_bytes: int | None = None) -> bytes:
@@ -176,6 +293,15 @@ def _errors_of_system(path: Path) -> Iterator[None]:
         circle = error.errno == errno.ELOOP
         reason = "is a link that leads in a circle" if circle else f"cannot be read: {error.strerror or error}"
         raise FileFormatError(path, reason) from None
+
+
+def _marks(stream: BufferedReader) -> tuple[int, ...]:
+    status = os.fstat(stream.fileno())
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
+
+
+def _changed(path: Path) -> FileFormatError:
+    return FileFormatError(path, "has been changed while this command was at work; give the command again")
 
 
 def _too_large(path: Path, size: int, limit: int) -> FileFormatError:

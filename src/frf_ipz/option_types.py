@@ -6,19 +6,37 @@ infinite or no number.
 
 from __future__ import annotations
 
+import datetime
+import re
 from typing import Annotated
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, PlainValidator
 
 LARGEST = 1e30  # in SI units: beyond, squares and products overflow, and nothing is so large
 SMALLEST = 1e-30  # of what is above 0
 MOST = 10**6  # of what is counted; beyond, memory and time have no end
 LARGEST_HZ = 1e9  # beyond any vibration: a frequency that was meant otherwise
+ISO_DAY = re.compile(r"\d{4}-\d{2}-\d{2}")
 
 
 def _require_size(value: float) -> float:
     if value < SMALLEST:
         raise ValueError(f"must be greater than {SMALLEST:g}: smaller sizes are those of nothing")
+    return value
+
+
+def _require_day(value: object) -> str:
+    """Take a date as TOML has it, or any text; one that looks like an ISO date is a day of the calendar."""
+    if isinstance(value, datetime.date):
+        return value.isoformat()
+    if not isinstance(value, str):
+        raise ValueError("must be a date such as 2026-11-27, or a text")  # noqa: TRY004  what pydantic collects
+    day = ISO_DAY.match(value)
+    if day is not None:
+        try:
+            datetime.date.fromisoformat(day[0])
+        except ValueError:
+            raise ValueError("must be a day of the calendar, as YYYY-MM-DD") from None
     return value
 
 
@@ -33,3 +51,4 @@ Seed = Annotated[int, Field(ge=0, strict=True)]
 Node = Annotated[int, Field(ge=1, strict=True)]
 NodeOrGround = Annotated[int, Field(ge=0, strict=True)]
 Name = Annotated[str, Field(min_length=1)]
+Day = Annotated[str, PlainValidator(_require_day)]

@@ -7,7 +7,10 @@ write to it but inside of `replacing`.
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
+import platform
+import re
 import secrets
 import shutil
 import time
@@ -20,7 +23,7 @@ from frf_ipz.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-BESIDE = ".frf-ipz-"  # how the name begins of a file that is not whole yet
+BESIDE = ".frf-ipz-"  # how the name begins of a file that is not whole yet; then which machine and process write it
 LONGEST_SUFFIX = len(".parquet")  # an ending that a writer may look at; the name in all must not be too long
 TRIES = 20  # on Windows, where a file that somebody reads this very moment cannot be replaced
 PAUSE_S = 0.05
@@ -55,7 +58,7 @@ def replacing(path: Path) -> Iterator[Path]:
     if exists and not os.access(target, os.W_OK):  # to be renamed over asks for no permission
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target))
     suffix = target.suffix if len(target.suffix) <= LONGEST_SUFFIX else ""
-    beside = target.with_name(f"{BESIDE}{secrets.token_hex(8)}{suffix}")
+    beside = target.with_name(f"{BESIDE}{_machine()}-{os.getpid()}-{secrets.token_hex(8)}{suffix}")
     try:
         yield beside
         sync(beside)
@@ -67,6 +70,41 @@ def replacing(path: Path) -> Iterator[Path]:
             beside.unlink(missing_ok=True)
         raise
     sync_folder(target.parent)
+
+
+def remove_litter(folder: Path) -> None:
+    """Remove files that were not whole yet when their process was killed.
+
+    Only those of this machine whose process is no more: another program may write in the folder this very moment.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they are looked for.
+    """
+    name = re.compile(re.escape(f"{BESIDE}{_machine()}-") + r"(?P<process>[1-9][0-9]{0,9})-[0-9a-f]{16}(\.\w+)?")
+    with suppress(OSError):
+        for path in list(folder.iterdir()):
+            match = name.fullmatch(path.name)
+            if match and path.is_file() and not path.is_symlink() and _has_ended(int(match["process"])):
+                path.unlink()
+
+
+def _machine() -> str:
+    return hashlib.sha256(platform.node().encode(errors="surrogateescape")).hexdigest()[:8]
+
+
+def _has_ended(process: int) -> bool:
+    """Tell whether a process is no more, where the system can be asked; on Windows asking would end it."""
+    if IS_WINDOWS:
+        return False
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False
 
 
 def write_text(path: Path, text: str, *, newline: str = "\n") -> None:

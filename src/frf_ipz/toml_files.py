@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 STRICT: dict[str, Any] = {"extra": "forbid", "arbitrary_types_allowed": True}
 
+MOST_SHOWN = 10  # wrong keys; more are those of another kind of file
 DEEPEST = 32  # levels of tables and lists; no file of the contract has more than six
 TOO_DEEP = "is nested too deeply; no key of this program is"
 CLASS_NAME = re.compile(r"(?:[A-Z][a-z]+){2,}")  # a dataclass that is a branch of a union
@@ -118,14 +119,22 @@ def to_options(table: Mapping[str, Any], options_type: type[Options], path: Path
     Raises
     ------
     FileFormatError
-        On the first key or value that does not fit.
+        If keys or values do not fit: names every one of them.
     """
+    kind: Any = options_type
     try:
-        return TypeAdapter(options_type).validate_python(dict(table))
+        options: Options = _adapter(kind).validate_python(dict(table))
     except ValidationError as error:
-        first = min(error.errors(), key=_rank)
-        where = ".".join(_key_text(part) for part in first["loc"] if not _is_type_tag(part))
-        raise FileFormatError(path, _explain(first, options_type), where=where and f"key '{where}'") from None
+        problems = _problems(error, options_type)
+    else:
+        return options
+    if len(problems) == 1:
+        ((where, problem),) = problems.items()
+        raise FileFormatError(path, problem, where=where)
+    shown = [f"({number}) {where}: {problem}" for number, (where, problem) in enumerate(problems.items(), start=1)]
+    more = len(shown) - MOST_SHOWN
+    rest = [f"and {more} more"] if more > 0 else []
+    raise FileFormatError(path, f"{len(shown)} keys do not fit: {'; '.join([*shown[:MOST_SHOWN], *rest])}")
 
 
 def check_values(options: object) -> None:
@@ -152,9 +161,34 @@ def check_values(options: object) -> None:
 
 
 @lru_cache
+def _adapter(kind: type) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
+
+
+@lru_cache
 def _adapters(kind: type) -> dict[str, TypeAdapter[Any]]:
     hints = get_type_hints(kind, include_extras=True)
     return {field.name: TypeAdapter(hints[field.name]) for field in fields(kind)}
+
+
+def _problems(error: ValidationError, options_type: type) -> dict[str, str]:
+    """Say what is wrong with each key, in the order of the file; a branch of a union is one complaint of several."""
+    found: dict[str, Any] = {}
+    for problem in error.errors():
+        where = _place(problem["loc"])
+        if where not in found or _rank(problem) < _rank(found[where]):
+            found[where] = problem
+    misspelt = {_place(problem["loc"][:-1]) for problem in found.values() if problem["type"] == REPORTED_FIRST[0]}
+    return {
+        where: _explain(problem, options_type)
+        for where, problem in found.items()
+        if problem["type"] != REPORTED_FIRST[1] or _place(problem["loc"][:-1]) not in misspelt
+    }
+
+
+def _place(location: tuple[int | str, ...]) -> str:
+    where = ".".join(_key_text(part) for part in location if not _is_type_tag(part))
+    return f"key '{where}'" if where else "the file"
 
 
 def _rank(error: Any) -> int:

@@ -30,7 +30,7 @@ def test_a_campaign_is_run_from_the_page_and_a_sensor_left_out(browser, tmp_path
     with served(folder) as address:
         page = Page(browser, address)
         assert "Nothing has been run yet" in page.find("main").text
-        page.click("[data-run]")
+        page.click("[data-command=run]")
         page.wait_for_results("")
         assert set(columns(run, "output_dof")["output_dof"]) == {"1:+z", "2:+z"}
         page.show("#structure")

@@ -2,13 +2,14 @@
 
 import errno
 import os
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
 from frf_ipz import output_files
-from frf_ipz.output_files import link_or_copy, replacing, write_text
+from frf_ipz.output_files import link_or_copy, remove_litter, replacing, write_text
 
 
 def names(folder):
@@ -36,6 +37,28 @@ def test_a_step_that_fails_leaves_what_was_there(tmp_path, monkeypatch, step):
         write_text(tmp_path / "a.txt", "new")
     assert (tmp_path / "a.txt").read_text() == "old"
     assert names(tmp_path) == ["a.txt"]
+
+
+def name_beside(folder):
+    with replacing(folder / "a.txt") as beside:
+        beside.write_text("half")
+        return beside.name
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="asking for a process would end it")
+def test_what_killed_processes_have_left_is_removed_and_nothing_else(tmp_path):
+    own = name_beside(tmp_path)
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    of_ended = own.replace(f"-{os.getpid()}-", f"-{ended.pid}-")
+    others = [own, of_ended[:-5], of_ended + ".txt", ".frf-ipz-notes.txt", of_ended.replace("frf-ipz-", "frf-ipz-0")]
+    assert of_ended != own
+    for name in (of_ended, *others):
+        (tmp_path / name).write_text("half")
+    (tmp_path / "folder").mkdir()
+    remove_litter(tmp_path)
+    assert names(tmp_path) == sorted(["a.txt", "folder", *others])
+    remove_litter(tmp_path / "none")
 
 
 def test_until_it_is_whole_the_old_file_is_there(tmp_path):

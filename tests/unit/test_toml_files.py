@@ -67,6 +67,18 @@ def test_what_does_not_fit_is_named(tmp_path, text, where, problem):
     assert "\n" not in message
 
 
+def test_all_that_does_not_fit_is_named_at_once(tmp_path):
+    with pytest.raises(FileFormatError) as caught:
+        read(tmp_path, '[fitt]\n[fit]\nband_hz = [1, "a"]\nstrike = [{ hz = 1, wy = "x" }, { hz = "b", why = "y" }]')
+    message = str(caught.value)
+    assert "4 keys do not fit" in message
+    for part in ("key 'fitt'", "did you mean 'fit'", "key 'fit.band_hz.[2]'", "'fit.strike.[1].wy'", "given is 'b'"):
+        assert part in message
+    assert "is missing" not in message  # 'why', which is what 'wy' was meant to be
+    with pytest.raises(FileFormatError, match="and 4 more"):
+        read(tmp_path, "[fit]\n" + "\n".join(f"key_{number} = 1" for number in range(14)))
+
+
 def test_a_missing_section_and_a_missing_file_are_reported(tmp_path):
     with pytest.raises(FileFormatError, match=r"no section \[pipeline\]"):
         read(tmp_path, "[fit]", required="pipeline")

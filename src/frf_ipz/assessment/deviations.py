@@ -153,7 +153,10 @@ def point_deviation(
     off = {column: _median_db(prediction.values[:, column], values) for column, values in known.items()}
     worst = max(off, key=lambda column: off[column])
     lines = np.flatnonzero(np.isfinite(known[worst]))
-    causes = UNKNOWN if with_causes is None else _median_db(with_causes.values[:, worst], known[worst])
+    causes = UNKNOWN
+    if with_causes is not None:  # where the shape alone is predicted, each prediction has its own level
+        beside = measured_at(with_causes, reference) or measured_at(with_causes, frfs)
+        causes = _median_db(with_causes.values[:, worst], beside[worst])
     return FrfDeviation(
         at=POINTS,
         frf=str(prediction.labels[worst]),

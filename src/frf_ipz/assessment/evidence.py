@@ -77,6 +77,4 @@ class Evidence(MeasuredPoints):
     def band(self) -> tuple[FloatArray, FloatArray]:
         """90 % band of the updated model's magnitudes at the measured points, two (n_lines, n_frfs) arrays."""
         s = np.asarray(2j * np.pi * self.frfs.frequency_hz[self.lines], np.complex128)
-        low, high = band_of_magnitudes(self.fit, self.updated_model, self.frfs.labels, s)
-        sizes = np.abs(self.gains)
-        return low * sizes, high * sizes
+        return band_of_magnitudes(self.fit, self.updated_model, self.frfs.labels, s)

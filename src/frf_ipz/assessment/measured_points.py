@@ -68,22 +68,14 @@ class MeasuredPoints:
         return self.frfs.unknown_scale != "none"
 
     @cached_property
-    def gains(self) -> FloatArray:
-        """(n_frfs,) gains that bring the updated model to the measured FRFs; 1 where the scale is known."""
-        if not self.is_relative:
-            return np.ones(len(self.frfs.labels))
-        return fitted_gains(self._unscaled(self.updated_model.model), self.measured)
-
-    @cached_property
     def updated(self) -> ComplexArray:
-        """(n_lines, n_frfs) FRFs of the updated model at the measured points."""
-        return self._unscaled(self.updated_model.model) * self.gains
+        """(n_lines, n_frfs) FRFs of the updated model at the measured points, in the unit of the measurement."""
+        return self._values(self.updated_model.model)
 
     @cached_property
     def nominal(self) -> ComplexArray:
         """(n_lines, n_frfs) FRFs of the model before updating at the measured points."""
-        values = self._unscaled(self.updated_model.nominal)
-        return values * fitted_gains(values, self.measured) if self.is_relative else values
+        return self._values(self.updated_model.nominal)
 
     @property
     def band_text(self) -> str:
@@ -108,24 +100,6 @@ class MeasuredPoints:
             difference = np.abs(20 * np.log10(np.abs(values) / np.abs(self.measured)))
         return np.where(self.is_heard, difference, np.nan)
 
-    def _unscaled(self, model: ReducedModel) -> ComplexArray:
-        return compute_frfs(model, self.frfs.labels, self.frfs.s[self.lines])
-
-
-def fitted_gains(values: ComplexArray, measured: ComplexArray) -> FloatArray:
-    """Give the real factor of each FRF that brings it to the measured one on most lines.
-
-    Parameters
-    ----------
-    values, measured : (n_lines, n_frfs) complex array
-        Of the model, and as measured.
-
-    Returns
-    -------
-    (n_frfs,) array
-        With its sign.
-    """
-    tiny = np.finfo(float).tiny
-    ratio = np.median(np.log(np.maximum(np.abs(measured), tiny) / np.maximum(np.abs(values), tiny)), axis=0)
-    sign = np.sign(np.sum((values.conj() * measured).real, axis=0))
-    return np.asarray(sign * np.exp(ratio))
+    def _values(self, model: ReducedModel) -> ComplexArray:
+        values = compute_frfs(model, self.frfs.labels, self.frfs.s[self.lines])
+        return values * self.updated_model.scale_of(model).gains(self.frfs.labels)

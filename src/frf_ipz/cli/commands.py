@@ -18,8 +18,8 @@ EPILOG = """
 [bold]From a folder of recordings to a controller-ready model[/bold]
 
   frf-ipz init FOLDER                    writes test.toml and pipeline.toml from the CSVs in FOLDER
-  frf-ipz check FOLDER/pipeline.toml     validates everything and draws the set-up
-  frf-ipz run FOLDER/pipeline.toml --out RESULTS
+  frf-ipz check FOLDER                   validates everything and draws the set-up
+  frf-ipz run FOLDER --out RESULTS
   frf-ipz show RESULTS                   opens the results as a page to look at and to work on
 
 [bold]Exit status[/bold]  0 done; 2 the input is wrong, one message says where and what to do; 1 no result could be
@@ -36,7 +36,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-PipelineArgument = Annotated[Path, typer.Argument(metavar="PIPELINE", help="The pipeline.toml to work on.")]
+PipelineArgument = Annotated[
+    Path, typer.Argument(metavar="PIPELINE", help="The pipeline.toml to work on, or the folder that holds it.")
+]
 OutOption = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no summary.")]
 

@@ -44,11 +44,11 @@ def serve_page(folder: Path, *, port: int, browser: bool | None) -> None:
     serve(folder, _run, _read, port=port, announce=announce)
 
 
-def _run(path: Path, out: Path, *, progress: Progress) -> Results:
+def _run(path: Path, out: Path, *, diagnosing: bool | None, progress: Progress) -> Results:
     """Run a pipeline; the stages are imported with the first change, so that the page is there at once."""
     from frf_ipz.pipeline.run import run_pipeline
 
-    return run_pipeline(path, out, progress=progress)
+    return run_pipeline(path, out, diagnosing=diagnosing, progress=progress)
 
 
 def _read(path: Path) -> PipelineInputs:

@@ -11,6 +11,10 @@ class DeadlineError(Exception):
     """The time of a search is over; whoever holds what was found so far goes on with that."""
 
 
+def _go_on() -> None:
+    """Say nothing."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Deadline:
     """A moment after which no further hypothesis is tried.
@@ -21,10 +25,13 @@ class Deadline:
         Wall time from now, s; no limit where it is left out.
     clock : callable
         Gives the time, s.
+    at_check : callable
+        Called between hypotheses; what it raises ends the search, and nothing is kept.
     """
 
     seconds: float | None = None
     clock: Callable[[], float] = time.monotonic
+    at_check: Callable[[], None] = _go_on
     _started: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -36,13 +43,14 @@ class Deadline:
         return self.seconds is not None and self.clock() - self._started > self.seconds
 
     def check(self) -> None:
-        """Go on while there is time.
+        """Go on while there is time, and somebody waits.
 
         Raises
         ------
         DeadlineError
             If there is none.
         """
+        self.at_check()
         if self.is_over:
             raise DeadlineError
 

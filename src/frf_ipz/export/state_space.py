@@ -30,6 +30,7 @@ from frf_ipz.export.realization import (
     with_delays,
 )
 from frf_ipz.frf import require_measured
+from frf_ipz.updating.scale import MeasuredScale
 from frf_ipz.updating.updated_model import UpdatedModel
 
 if TYPE_CHECKING:
@@ -154,8 +155,8 @@ def make_state_space(
     _require_exported(measured, updated_model, options, delays_s)
     chosen = options or ExportOptions()
     ports = _ports(measured, points, chosen, delays_s)
-    system = _modal_system(updated_model.model, ports, chosen)
-    return _to_state_space(system, select_states(system), ports, chosen)
+    system = _modal_system(updated_model.model, updated_model.scale, ports, chosen)
+    return _to_state_space(system, select_states(system), ports, chosen, scale=updated_model.scale)
 
 
 def make_state_space_ensemble(
@@ -195,14 +196,17 @@ def make_state_space_ensemble(
     chosen = options or ExportOptions()
     ports = _ports(measured, points, chosen, delays_s)
     members = updated_model.ensemble[: chosen.ensemble]
+    scales = updated_model.scale.members(len(members))
     selection = select_states(
-        _modal_system(updated_model.model, ports, chosen)
+        _modal_system(updated_model.model, updated_model.scale, ports, chosen)
     )  # one for all: they have the same states
     systems = (
-        _modal_system(replace(updated_model.model, mass=mass, damping=damping, stiffness=stiffness), ports, chosen)
-        for mass, damping, stiffness in members
+        _modal_system(
+            replace(updated_model.model, mass=mass, damping=damping, stiffness=stiffness), scale, ports, chosen
+        )
+        for (mass, damping, stiffness), scale in zip(members, scales, strict=True)
     )
-    return tuple(_to_state_space(system, selection, ports, chosen) for system in systems)
+    return tuple(_to_state_space(system, selection, ports, chosen, scale=updated_model.scale) for system in systems)
 
 
 def to_state_space(
@@ -372,13 +376,16 @@ def _require_exported(
     require_type("delays_s", delays_s, Mapping, optional=True)
 
 
-def _modal_system(model: ReducedModel, ports: Ports, options: ExportOptions) -> SecondOrder:
-    rows = [np.array([model.row(dof) for dof in dofs]) for dofs in (ports.inputs, [port.dof for port in ports.outputs])]
-    system = modal_form(model, *rows)
+def _modal_system(model: ReducedModel, scale: MeasuredScale, ports: Ports, options: ExportOptions) -> SecondOrder:
+    inputs = np.array([scale.input_gain(dof) * model.row(dof) for dof in ports.inputs])
+    outputs = np.array([scale.output_gain(port.dof) * model.row(port.dof) for port in ports.outputs])
+    system = modal_form(model, inputs, outputs)
     return condense_high_modes(system, model.n_modes) if options.residual == "feedthrough" else system
 
 
-def _to_state_space(system: SecondOrder, selection: Selection, ports: Ports, options: ExportOptions) -> StateSpaceModel:
+def _to_state_space(
+    system: SecondOrder, selection: Selection, ports: Ports, options: ExportOptions, *, scale: MeasuredScale
+) -> StateSpaceModel:
     outputs = ports.outputs
     matrices = to_first_order(take_states(system, selection), [output.quantity.power for output in outputs])
     modes = [f"rigid-body mode {number + 1}" for number in range(selection.seen)]
@@ -401,7 +408,7 @@ def _to_state_space(system: SecondOrder, selection: Selection, ports: Ports, opt
         state_names=tuple(names),
         input_units=ports.input_units,
         output_units=tuple(output.unit for output in outputs),
-        notes=_notes(system, selection),
+        notes=(*_notes(system, selection), *_scale_notes(scale)),
     )
 
 
@@ -421,6 +428,13 @@ def _notes(system: SecondOrder, selection: Selection) -> tuple[str, ...]:
         shown = ", ".join(left_out[:MODES_SHOWN]) + (", ..." if len(left_out) > MODES_SHOWN else "")
         notes.append(f"left out, since no input drives it or no output sees it: {shown}")
     return tuple(notes)
+
+
+def _scale_notes(scale: MeasuredScale) -> tuple[str, ...]:
+    if not scale.is_relative:
+        return ()
+    place = "; inputs and outputs carry these gains, so the state space gives FRFs as they were measured"
+    return (scale.statement + (place if scale.is_fitted else ""),)
 
 
 def _ports(

@@ -18,8 +18,9 @@ from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
 from frf_ipz.display import Concise
 from frf_ipz.dofs import as_dofs
 from frf_ipz.errors import InputError
-from frf_ipz.frf import require_measured
+from frf_ipz.frf import FrfLabel, require_measured
 from frf_ipz.prediction.ensemble import ModelEnsemble
+from frf_ipz.quantities import FrfQuantity
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
 
 if TYPE_CHECKING:
@@ -182,8 +183,11 @@ def _relative_error(updated: UpdatedModel, output: Dof, inputs: Sequence[Dof], s
     for force in inputs:
         rows = model.row(output), model.row(force)
         receptance = updated_frfs.receptance(*rows, s)
-        size += np.abs(receptance[0]) ** 2
-        distance += np.abs(member_frfs.receptance(*rows, s) - receptance) ** 2
+        members = member_frfs.receptance(*rows, s)
+        label = FrfLabel(output, force, FrfQuantity.RECEPTANCE)
+        gain, drawn = updated.scale.gain(label), updated.scale.drawn(label, len(members))[:, None]
+        size += np.abs(gain * receptance[0]) ** 2
+        distance += np.abs(gain * (drawn * members - receptance)) ** 2
     return np.asarray(np.quantile(np.sqrt(distance / size), QUANTILE, axis=0))
 
 

@@ -213,6 +213,7 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
         channel_gains=gains.table,
         noise_from=fitted.noise_from,
         warnings=(*_warnings(frfs, fitted, halves, unconfirmed), *gains.remarks),
+        unknown_scale=frfs.unknown_scale,
     )
 
 

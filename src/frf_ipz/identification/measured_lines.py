@@ -199,7 +199,7 @@ def with_misfit_noise(lines: MeasuredLines, misfit: ComplexArray) -> MeasuredLin
 
 
 def _usable(frfs: FrfSet, known: BoolArray) -> BoolArray:
-    usable = frfs.s != 0
+    usable = frfs.frequency_hz > 0  # sensors have an offset there, whatever an exponential window makes of it
     usable &= (np.isfinite(frfs.variance) | ~known).all(axis=1)
     coherent = np.isfinite(frfs.coherence)
     if coherent.any():
@@ -211,7 +211,9 @@ def _signal_band(frfs: FrfSet, noise: FloatArray, usable: BoolArray) -> tuple[fl
     """Find the band that carries signal, where the user gives none."""
     is_known = np.isfinite(noise) & (noise > 0)
     ratio = np.divide(np.abs(frfs.values) ** 2, noise, out=np.zeros(frfs.values.shape), where=is_known)
-    has_signal = usable & (np.median(ratio, axis=1) > SIGNAL**2)
+    carries = np.median(ratio[usable], axis=0) > SIGNAL**2 if usable.any() else np.zeros(frfs.n_frfs, bool)
+    of_signal = ratio[:, carries] if carries.any() else ratio  # FRFs that hold noise only say nothing of the band
+    has_signal = usable & (np.median(of_signal, axis=1) > SIGNAL**2)
     if not has_signal.any():
         raise InputError("no frequency line carries a signal above the noise; check the recordings and their channels")
     share = np.cumsum(has_signal) / has_signal.sum()

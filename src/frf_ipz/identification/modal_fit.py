@@ -63,6 +63,8 @@ class ModalFit(Tabulated, Drawn):
         ``recordings`` or ``misfit``: where the covariance's sigma comes from.
     warnings : tuple of str
         What the user has to know.
+    unknown_scale : str
+        ``none``, ``common`` or ``per_channel``, as the FRFs say: gains that are fitted once there is a model.
 
     Examples
     --------
@@ -106,6 +108,7 @@ class ModalFit(Tabulated, Drawn):
     channel_gains: pd.DataFrame
     noise_from: str
     warnings: tuple[str, ...] = ()
+    unknown_scale: str = "none"
 
     def __repr__(self) -> str:
         values = [f"{hertz:.2f}" for hertz in natural_frequency_hz(self.model.poles[: self.n_modes])]

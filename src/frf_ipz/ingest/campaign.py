@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 UNITS = dict(zip(RESPONSES, ("m", "m/s", "m/s^2"), strict=True))
+PARTICULARS = ("operator", "date", "equipment", "customer", "serial_number")  # shown, and used for nothing else
 ROTATIONAL_UNITS = dict(zip(RESPONSES, ("rad", "rad/s", "rad/s^2"), strict=True))
 
 
@@ -227,10 +228,15 @@ class VibrationTest(Concise):
         The FRFs that the test gives, each once.
     table : TableKeys
         Where the time, the rate and the names stand in the recordings, as far as the test says so.
+    applied_window_s : float, optional
+        Time constant of an exponential window that the responses in the files have already been given, s.
     signals : mapping of Path to (n_samples, 2 + n_outputs) array
         Recordings that are in memory: time in s, force, responses, SI. They are not read from a file.
     frfs : FrfSet, optional
         FRFs that are in memory.
+    particulars : mapping of str to str
+        Who measured, when, with what, for whom, and which machine: ``operator``, ``date``, ``equipment``,
+        ``customer``, ``serial_number``, as far as they are stated.
 
     Examples
     --------
@@ -262,8 +268,10 @@ class VibrationTest(Concise):
     frf_sources: tuple[FrfSource, ...]
     labels: tuple[FrfLabel, ...]
     table: TableKeys = field(default_factory=TableKeys)
+    applied_window_s: float | None = None
     signals: Mapping[Path, FloatArray] = field(default_factory=dict, repr=False)
     frfs: FrfSet | None = field(default=None, repr=False)
+    particulars: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @classmethod
     def from_recordings(

@@ -11,12 +11,12 @@ from frf_ipz.arguments import require_file
 from frf_ipz.dofs import Dof, as_direction, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean, errors_of_file
 from frf_ipz.frf import FrfLabel
-from frf_ipz.ingest.campaign import Channel, TestSetup, VibrationTest, setup_labels
+from frf_ipz.ingest.campaign import PARTICULARS, Channel, TestSetup, VibrationTest, setup_labels
 from frf_ipz.ingest.formats.frf_file import FrfSource, frf_label
 from frf_ipz.ingest.formats.recording import TableKeys
 from frf_ipz.ingest.formats.registry import read_frf_file
 from frf_ipz.ingest.units import sensitivity_factor, unit_factor
-from frf_ipz.option_types import Count, CountOrNone, NotNegative, Positive, Ratio
+from frf_ipz.option_types import Count, CountOrNone, Day, NotNegative, Positive, Ratio
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.toml_files import STRICT, read_toml
 
@@ -45,6 +45,17 @@ class TestKeys:
         Samples a second, for recordings without a column of time, or with too few digits in it.
     header_row : int, optional
         Line of the columns' names in the recordings, counted from 1; found where it is left out.
+    applied_exponential_window_s : float, optional
+        Time constant of a window that the analyser has already put on the responses, 1 at the first sample, s. Its
+        damping is taken back.
+    operator : str
+        Who measured; shown on the page, as the keys below, and used for nothing else.
+    date : str
+        When it was measured: a date, such as 2026-11-27, or any text.
+    equipment, customer : str
+        What it was measured with, and for whom.
+    serial_number : str
+        Of the machine that was measured.
     """
 
     __pydantic_config__ = STRICT
@@ -56,6 +67,12 @@ class TestKeys:
     time_column: str | int = ""
     sample_rate_hz: Positive | None = None
     header_row: Count | None = None
+    applied_exponential_window_s: Positive | None = None
+    operator: str = ""
+    date: Day = ""
+    equipment: str = ""
+    customer: str = ""
+    serial_number: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -244,9 +261,11 @@ def read_test(path: str | Path) -> VibrationTest:
             sample_rate_hz=keys.test.sample_rate_hz,
             header_row=keys.test.header_row,
         ),
+        applied_window_s=keys.test.applied_exponential_window_s,
         channels=channels,
         setups=setups,
         frf_sources=sources,
+        particulars={name: text for name in PARTICULARS if (text := getattr(keys.test, name).strip())},
         labels=tuple(dict.fromkeys(labels)),
     )
 
@@ -264,6 +283,9 @@ def _check_sections(path: Path, keys: CampaignFileKeys) -> None:
     for name in present:
         if name != entry:
             raise FileFormatError(path, f"a test of kind '{kind}' has [[{entry}]] entries", where=f"key '{name}'")
+    if kind == "random" and keys.test.applied_exponential_window_s is not None:
+        problem = "an exponential window belongs to impacts: on the record of a shaker it distorts; record without it"
+        raise FileFormatError(path, problem, where="key 'test.applied_exponential_window_s'")
     if not present:
         raise FileFormatError(path, f"a test of kind '{kind}' needs at least one [[{entry}]]")
     if kind == "frf" and keys.channel:

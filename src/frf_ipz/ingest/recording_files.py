@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 BUDGET = 64_000_000  # bytes of recordings that are cached
 UNIFORM = 0.01  # of the median step: the contract's limit for a step that differs
 FEWEST_SAMPLES = 16
+NOTHING_LEFT = -math.log(np.finfo(np.float64).eps)  # time constants after which a window is less than a double's digit
 
 
 @dataclass(kw_only=True)
@@ -122,9 +123,13 @@ class RecordingFiles:
             for channel, dof, file_unit in zip(channels, dofs, recording.units[1:], strict=True)
         ]
         time_check = _UniformTimeCheck(recording)
+        start_s: float | None = None
         for block in recording.blocks:
             block *= factors  # in place: the block is ours, and copies cost time
             time_check.add(block[:, 0])
+            if self.test.applied_window_s is not None:
+                start_s = block[0, 0] if start_s is None and len(block) else start_s
+                _take_back_window(path, block, start_s or 0.0, self.test.applied_window_s)
             yield block
         time_check.finish()
 
@@ -162,6 +167,18 @@ class _UniformTimeCheck:
         if self._n_rows < FEWEST_SAMPLES:
             problem = f"holds {self._n_rows} samples; a recording needs at least {FEWEST_SAMPLES}: is it cut off?"
             raise FileFormatError(self._path, problem)
+
+
+def _take_back_window(path: Path, block: FloatArray, start_s: float, time_constant_s: float) -> None:
+    """Divide the responses by the exponential window that an analyser has put on them, 1 at the first sample."""
+    exponent = (block[:, 0] - start_s) / time_constant_s
+    if len(exponent) and exponent[-1] > NOTHING_LEFT:
+        problem = (
+            f"after {block[-1, 0] - start_s:.4g} s an exponential window of {time_constant_s:g} s has left nothing; "
+            "state the time constant that the analyser shows, in s, and cut recordings of several impacts apart"
+        )
+        raise FileFormatError(path, problem, where="[test] applied_exponential_window_s")
+    block[:, 2:] *= np.exp(exponent)[:, None]
 
 
 def _time_factor(recording: RawRecording) -> float:

@@ -203,6 +203,8 @@ def undamped_zeros(mass: FloatArray, stiffness: FloatArray, output_row: FloatArr
     """
     rows, columns = complement(input_row), complement(output_row)
     small_mass = rows.T @ mass @ columns
+    if small_mass.size == 0:
+        return _no_roots(len(rows))
     values, y, x = _generalised_eig(rows.T @ stiffness @ columns, small_mass)
     slope = np.einsum("ik,ij,jk->k", y, small_mass, x)
     return Roots(values=values, right_vectors=columns @ x, left_vectors=rows @ y, slope=slope)
@@ -302,9 +304,10 @@ def _quadratic_roots(
     if rows is not None and columns is not None:
         mass, damping, stiffness = (rows.T @ matrix @ columns for matrix in (mass, damping, stiffness))
     order = len(mass)
-    # time is scaled so that mass and stiffness are of one size: QZ is accurate relative to the norm of the whole pencil
     norm = np.linalg.norm(stiffness) or np.linalg.norm(mass)  # a free rigid body has no stiffness
-    scale = np.sqrt(norm / np.linalg.norm(mass))
+    if norm == 0.0:
+        return _no_roots(0 if rows is None else len(rows))
+    scale = _time_scale(norm, np.linalg.norm(damping), np.linalg.norm(mass))
     first, second = np.zeros((2, 2 * order, 2 * order))
     first[:order, order:] = second[:order, :order] = np.eye(order)
     first[order:, :order] = stiffness / -norm
@@ -316,6 +319,21 @@ def _quadratic_roots(
     if rows is not None and columns is not None:
         y, x = rows @ y, columns @ x
     return Roots(values=values, right_vectors=x, left_vectors=y, slope=slope)
+
+
+def _time_scale(stiffness: np.floating, damping: np.floating, mass: np.floating) -> float:
+    """Scale time so that mass and stiffness are of one size: QZ is accurate relative to the norm of the whole pencil.
+
+    Between two masses that only a spring and a damper connect, no mass acts.
+    """
+    if mass > 0.0:
+        return float(np.sqrt(stiffness / mass))
+    return float(stiffness / damping) if damping > 0.0 else 1.0
+
+
+def _no_roots(size: int) -> Roots:
+    none, vectors = np.zeros(0, complex), np.zeros((size, 0), complex)
+    return Roots(values=none, right_vectors=vectors, left_vectors=vectors, slope=none)
 
 
 def _generalised_eig(first: FloatArray, second: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

@@ -19,12 +19,13 @@ from frf_ipz.frf import FrfSet
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.campaign import VibrationTest
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.input_files import Ledger, digest_file, entering
 from frf_ipz.pipeline.config import StageOptions
 from frf_ipz.pipeline.inputs import PipelineInputs, complete_model
 from frf_ipz.pipeline.run import run_chain, run_in_memory
 from frf_ipz.pipeline.sensors import without_sensors
 from frf_ipz.progress import silent
-from frf_ipz.runs.digests import digest_arrays, digest_file
+from frf_ipz.runs.digests import digest_arrays
 from frf_ipz.runs.folder import open_run
 from frf_ipz.runs.results import open_results
 from frf_ipz.structure import StructuralModel
@@ -163,7 +164,9 @@ class Campaign(Concise):
         points = as_dofs(self.points)
         if self.fe_model is None and points:
             raise InputError("points of interest need an FE model; hand it in as the second argument")
-        digests = {str(file): digest_file(file) for file in test.files} | {MEASUREMENT: _digest_test(test)}
+        ledger = Ledger()
+        with entering(ledger):
+            digests = {str(file): digest_file(file) for file in test.files} | {MEASUREMENT: _digest_test(test)}
         if self.fe_model is not None:
             digests[MODEL] = _digest_model(self.fe_model)
         if self.reference is not None:
@@ -182,6 +185,7 @@ class Campaign(Concise):
             model_names=() if self.fe_model is None else (MODEL,),
             reference=self.reference,
             reference_name=REFERENCE if self.reference is not None else "",
+            ledger=ledger,
         )
 
 

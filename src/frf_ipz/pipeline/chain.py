@@ -35,7 +35,8 @@ def chain(
     until : str
         The last stage that is wanted. A diagnosis is looked at: one that is the last has its page.
     diagnosing : bool, optional
-        Look for what the model left out, in any time; by default as ``[diagnose]`` says.
+        Look for what the model left out, in any time; by default as ``[diagnose]`` says. Where it is not looked for,
+        what the folder holds of these very inputs still counts.
     progress : Progress
         Called with the fraction done and what is being done.
 
@@ -52,6 +53,9 @@ def chain(
     diagnosis = found = None
     is_asked = diagnosing is True
     is_diagnosing = options.run != "never" if diagnosing is None else diagnosing
+    is_known = model is not None and mismatch.is_known(runner)
+    if not is_diagnosing and not is_known:
+        store.mark_stale(mismatch.STAGES)
     if model is not None and is_diagnosing and options.apply:
         diagnosis = mismatch.diagnose(runner, model, frfs, is_asked=is_asked)
         model, frfs = mismatch.apply_diagnosis(runner, model, frfs, diagnosis)
@@ -59,7 +63,7 @@ def chain(
     yield "fit"
     if model is not None:
         modelling.outline(runner, model, corrected_by=diagnosis)
-        if is_diagnosing:
+        if is_diagnosing or is_known:
             if diagnosis is None:
                 found = mismatch.diagnose(runner, model, frfs, is_asked=is_asked)
             mismatch.levels(runner, fit, recordings.frfs)

@@ -10,6 +10,7 @@ from frf_ipz.export.options import ExportOptions
 from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.pipeline.pipeline_folder import find_pipeline
 from frf_ipz.prediction.options import PredictOptions
 from frf_ipz.toml_files import STRICT, read_toml
 from frf_ipz.updating.options import UpdateOptions
@@ -108,7 +109,7 @@ def read_pipeline(path: Path) -> Pipeline:
     Parameters
     ----------
     path : Path
-        The file.
+        The file, or a folder that holds exactly one.
 
     Returns
     -------
@@ -117,9 +118,10 @@ def read_pipeline(path: Path) -> Pipeline:
 
     Raises
     ------
-    FileFormatError
-        If the file, or a key in it, is wrong.
+    InputError
+        If the file, or a key in it, is wrong, or a folder holds none or several.
     """
+    path = find_pipeline(path)
     file = read_toml(path, PipelineFile, required="pipeline")
     folder = path.resolve().parent
     model, reference = file.pipeline.model, file.predict.reference

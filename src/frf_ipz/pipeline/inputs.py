@@ -12,9 +12,9 @@ from frf_ipz.fe.changes import with_default_damping, with_point_masses
 from frf_ipz.fe.model_file import model_files, read_model
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimation.frf_files import read_frfs
+from frf_ipz.input_files import Ledger, digest_file, entering
 from frf_ipz.pipeline.config import StageOptions, read_pipeline
 from frf_ipz.pipeline.sensors import without_sensors
-from frf_ipz.runs.digests import digest_file
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -57,6 +57,8 @@ class PipelineInputs:
         FRFs that a prediction is judged by.
     reference_name : str
         Its name in `digests`.
+    ledger : Ledger
+        What was in each file: a stage that reads one again must find the same.
     """
 
     name: str
@@ -72,6 +74,7 @@ class PipelineInputs:
     model_names: tuple[str, ...] = ()
     reference: FrfSet | None = None
     reference_name: str = ""
+    ledger: Ledger = field(default_factory=Ledger)
 
     @property
     def model_key(self) -> list[object]:
@@ -86,7 +89,7 @@ def read_inputs(path: Path) -> PipelineInputs:
     Parameters
     ----------
     path : Path
-        ``pipeline.toml``.
+        ``pipeline.toml``, or a folder that holds exactly one pipeline.
 
     Returns
     -------
@@ -98,6 +101,12 @@ def read_inputs(path: Path) -> PipelineInputs:
     InputError
         On the first thing that is wrong: which file, which place, what was expected.
     """
+    ledger = Ledger()
+    with entering(ledger):
+        return _read_inputs(path, ledger)
+
+
+def _read_inputs(path: Path, ledger: Ledger) -> PipelineInputs:
     pipeline = read_pipeline(path)
     test = _read_test(pipeline)
     points = _read_points(pipeline)
@@ -127,6 +136,7 @@ def read_inputs(path: Path) -> PipelineInputs:
         model_names=tuple(str(file) for file in files_of_model),
         reference=None if aside is None else read_frfs(aside, quantity=test.labels[0].quantity),
         reference_name="" if aside is None else str(aside),
+        ledger=ledger,
     )
 
 

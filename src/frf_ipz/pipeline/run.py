@@ -36,15 +36,16 @@ def run_pipeline(
     Parameters
     ----------
     path : str or Path
-        ``pipeline.toml``.
+        ``pipeline.toml``, or a folder that holds exactly one pipeline.
     out : str or Path
         The run's folder; made where there is none. A run that fails leaves what was there.
     until : str
         The last stage to run: ``ingest``, ``fit``, ``diagnose``, ``pair``, ``update``, ``predict``, ``export`` or
         ``report``.
     diagnosing : bool, optional
-        Look for what the model left out, without a limit of time unless one is stated; where it is left out,
-        ``[diagnose] run`` says whether, and the time is limited.
+        Look for what the model left out, without a limit of time unless one is stated; False: do not, and take what
+        was found of these very inputs before. Where it is left out, ``[diagnose] run`` says whether, and the time is
+        limited.
     progress : Progress
         Called with the fraction done and what is being done.
 
@@ -145,6 +146,7 @@ def _provenance(inputs: PipelineInputs) -> dict[str, Any]:
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
         "pipeline": inputs.source,
         "name": inputs.name,
+        "test": {"name": inputs.test.name, "kind": inputs.test.kind, **inputs.test.particulars},
         "configuration": plain(inputs.options),
         "inputs": dict(inputs.digests),
     }

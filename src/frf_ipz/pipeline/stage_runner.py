@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from frf_ipz.errors import errors_of_arithmetic
+from frf_ipz.input_files import entering
 from frf_ipz.runs.digests import digest
 from frf_ipz.runs.software import software
 
@@ -84,10 +85,14 @@ class StageRunner:
         """
         key = self.make_key(name, depends)
         with errors_of_arithmetic(f"the stage '{name}'"):
-            result = self.store.stage(name, key, lambda: compute(self.stage_progress(name)), files)
+            result = self.store.stage(name, key, lambda: self._compute(name, compute), files)
         if name in self.store.computed:
             self.store.mark_stale(dependents(name))
         return result
+
+    def _compute(self, name: str, compute: Callable[[Progress], Result]) -> Result:
+        with entering(self.inputs.ledger):  # the key says what was in the files that are read here
+            return compute(self.stage_progress(name))
 
     def make_key(self, name: str, depends: Mapping[str, object]) -> str:
         """Make the key of a stage, and keep it for the stages after it.

@@ -24,6 +24,7 @@ from frf_ipz.arguments import as_path
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.output_files import replacing
 from frf_ipz.plotting.picture import (
+    PLAIN_NUMBERS,
     Areas,
     Axis,
     Band,
@@ -63,7 +64,7 @@ LEGEND_SYMBOL = 7.0  # at most, points
 CHARACTERS = 96  # of the legend's font in the width of a figure
 SYMBOL_CHARACTERS = 7  # as wide as a symbol before a name
 ALL_LABELLED = 0.5  # decades of a logarithmic axis of which all ticks are labelled
-FEW_DECADES, PLAIN = 2.0, (1e-4, 1e5)  # seen of a logarithmic axis whose ticks are plain numbers
+FEW_DECADES = 2.0  # seen of a logarithmic axis whose ticks are plain numbers
 SHADE_TICKS = tuple(np.log10([1, 2, 5]).tolist())  # of each decade
 MOST_CELLS = 240  # of a map in which the numbers are written
 MANY_POINTS = 20_000  # from which a vector file holds a raster of them
@@ -318,7 +319,7 @@ def _label(value: float, ticks: XAxis | YAxis) -> str:
     """Write a tick as a plain number where few powers of ten are seen."""
     low, high = sorted(ticks.get_view_interval())
     decades = float(np.log10(high / low)) if low > 0 else np.inf
-    is_plain = PLAIN[0] < low and high < PLAIN[1] and decades <= FEW_DECADES
+    is_plain = PLAIN_NUMBERS[0] < low and high < PLAIN_NUMBERS[1] and decades <= FEW_DECADES
     return f"{value:.4g}" if is_plain and (decades <= ALL_LABELLED or f"{value:e}"[0] in "1235") else ""
 
 
@@ -495,17 +496,19 @@ def _(layer: Span, ax: Axes) -> Artist:
 
 @_draw_layer.register(HeatMap)
 def _(layer: HeatMap, ax: Axes) -> Artist:
-    logarithm = np.log10(np.maximum(layer.values, 1e-3))
-    top = float(np.log10(layer.highest))
-    image = ax.imshow(logarithm, cmap="cividis", aspect="auto", vmin=0, vmax=top)
+    top = layer.highest_shade
+    image = ax.imshow(layer.shades, cmap="cividis", aspect="auto", vmin=0, vmax=top)
     ax.set_xticks(range(len(layer.columns)), _names(layer.columns))
     ax.set_yticks(range(len(layer.rows)), _names(layer.rows))
     ticks = [decade + step for decade in range(int(top) + 1) for step in SHADE_TICKS if decade + step <= top]
-    bar = ax.figure.colorbar(image, ax=ax, ticks=ticks, format=FuncFormatter(lambda value, _: f"{10**value:.3g}"))
+    powers = FuncFormatter(lambda value, _: f"{10**value:.3g}")
+    bar = ax.figure.colorbar(
+        image, ax=ax, ticks=None if layer.is_linear else ticks, format=None if layer.is_linear else powers
+    )
     bar.set_label(_plain(layer.scale_title), fontsize=8)
     bar.ax.tick_params(labelsize=8)
     if layer.values.size <= MOST_CELLS:
-        for (row, column), value in np.ndenumerate(logarithm):
+        for (row, column), value in np.ndenumerate(layer.shades):
             colour = "white" if value < top / 2 else "black"
             ax.text(column, row, layer.texts[row][column], ha="center", va="center", fontsize=7, color=colour)
     return image

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
 
 NO_VARIANCE = "The variance of these FRFs is not known, so no band is drawn. "
+PHASE_HOVER = "{x:.6g} Hz: {y:.1f}°"
 PHASE_AXIS = Axis(title="Phase, °", limits=PHASE_LIMITS, tick_step=90.0)
 DOTTED = ". Where the solid curve stays near the dotted one, the fit says all that the data say."
 SHADED = " Shaded: where the fitted curve lies with 95 %; zoom in where it is thinner than the line."
@@ -70,7 +71,7 @@ def describe_frfs(
     magnitudes, phases, coherences = [], [], []
     for index in range(frfs.n_frfs):
         magnitudes += _magnitude(frfs, index)
-        phases.append(_thin_line(frfs, index, phase_degrees(frfs.values[:, index]), "{x:.6g} Hz: {y:.1f}°"))
+        phases.append(_thin_line(frfs, index, phase_degrees(frfs.values[:, index]), PHASE_HOVER))
         coherences.append(_thin_line(frfs, index, frfs.coherence[:, index], "{x:.6g} Hz: {y:.5f}"))
     y = Axis(title=magnitude_title(frfs.labels), scale="log", limits=_magnitude_limits(frfs, band_hz))
     panels = [Panel(y=y, layers=(*spans, *magnitudes), share=2.2), Panel(y=PHASE_AXIS, layers=tuple(phases))]
@@ -161,6 +162,68 @@ def magnitude_hover(label: FrfLabel) -> str:
         Hover pattern of a layer.
     """
     return f"{{x:.6g}} Hz: {{y:.4g}} {in_hover(label.unit)}"
+
+
+def magnitude_and_phase(
+    name: str,
+    colour: Role,
+    x: FloatArray,
+    values: ComplexArray,
+    hover: str,
+    *,
+    opacity: float = 1.0,
+    dash: str = "solid",
+    width: float,
+) -> tuple[Line, Line]:
+    """Draw an FRF as two curves.
+
+    Parameters
+    ----------
+    name : str
+        For the legend.
+    colour : Role
+        What it is.
+    x : (n_lines,) array
+        Hz.
+    values : (n_lines,) complex array
+        The FRF.
+    hover : str
+        Pattern of the magnitude, as `magnitude_hover` gives it.
+    opacity : float
+        1 hides what lies behind.
+    dash : str
+        As that of a `Line`.
+    width : float
+        Pixels.
+
+    Returns
+    -------
+    magnitude, phase : Line
+        Shown and hidden together.
+    """
+    magnitude = Line(
+        name=name,
+        colour=colour,
+        opacity=opacity,
+        group=name,
+        x=x,
+        y=np.abs(values),
+        dash=dash,
+        width=width,
+        hover=hover,
+    )
+    phase = Line(
+        name=name,
+        colour=colour,
+        opacity=opacity,
+        group=name,
+        x=x,
+        y=phase_degrees(values),
+        dash=dash,
+        width=width,
+        hover=PHASE_HOVER,
+    )
+    return magnitude, phase
 
 
 def describe_fit(frfs: FrfSet, fit: ModalFit) -> Picture:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 WIDE = 30.0  # ratio of the ends from which a frequency axis is logarithmic
 FREQUENCY = "Frequency, Hz"
+PLAIN_NUMBERS = (1e-4, 1e5)  # between them a logarithmic axis can do without powers of ten
 HEIGHT_PX = 420  # of a picture with one panel
 
 
@@ -321,7 +322,7 @@ class Bars(Layer):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HeatMap(Layer):
-    """A matrix of numbers as shades of their logarithm.
+    """A matrix of numbers as shades: of their logarithm from 1, or of the numbers from 0.
 
     Parameters
     ----------
@@ -332,7 +333,9 @@ class HeatMap(Layer):
     texts : sequence of sequence of str
         The numbers as people read them, row by row.
     highest : float
-        Number of the last shade; 1 is the first one.
+        Number of the last shade.
+    is_linear : bool
+        Shades are of the numbers; else of their logarithm.
     scale_title : str
         What the numbers are.
     hover : str
@@ -345,7 +348,18 @@ class HeatMap(Layer):
     texts: Sequence[Sequence[str]]
     highest: float
     scale_title: str
+    is_linear: bool = False
     hover: str = ""
+
+    @property
+    def shades(self) -> FloatArray:
+        """What is shaded, from 0."""
+        return self.values if self.is_linear else np.log10(np.maximum(self.values, 1e-3))
+
+    @property
+    def highest_shade(self) -> float:
+        """Where the shades end."""
+        return self.highest if self.is_linear else float(np.log10(self.highest))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

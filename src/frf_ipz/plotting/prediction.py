@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.plotting.curves import LEAST, magnitude_title, phase_degrees
-from frf_ipz.plotting.frfs import PHASE_AXIS, magnitude_hover
-from frf_ipz.plotting.picture import Axis, Band, Layer, Line, Panel, Picture, Role, frequency_axis
+from frf_ipz.plotting.curves import LEAST, magnitude_title
+from frf_ipz.plotting.frfs import PHASE_AXIS, magnitude_and_phase, magnitude_hover
+from frf_ipz.plotting.picture import Axis, Band, Layer, Panel, Picture, Role, frequency_axis
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.arrays import ComplexArray
     from frf_ipz.prediction.prediction import Prediction
 
-PHASE_HOVER = "{x:.6g} Hz: {y:.1f}°"
 
-
-def describe_prediction(prediction: Prediction, frf: int, measured: ComplexArray | None = None) -> Picture:
+def describe_prediction(
+    prediction: Prediction, frf: int, measured: ComplexArray | None = None, *, is_kept_aside: bool = False
+) -> Picture:
     """Describe a predicted FRF with its 90 % band, beside the nominal one.
 
     Parameters
@@ -28,6 +28,8 @@ def describe_prediction(prediction: Prediction, frf: int, measured: ComplexArray
         Which of its FRFs.
     measured : (n_lines,) complex array, optional
         What was measured there, on the lines of the prediction, in SI units; NaN where nothing was.
+    is_kept_aside : bool
+        That was kept aside as a reference: the models know nothing of it.
 
     Returns
     -------
@@ -35,18 +37,22 @@ def describe_prediction(prediction: Prediction, frf: int, measured: ComplexArray
         Magnitude and phase.
     """
     label, x = prediction.labels[frf], prediction.frequency_hz
+    name_of_measured = "measured, kept aside" if is_kept_aside else "measured"
+    name_of_measured += ", at the level of the prediction" if frf in prediction.relative else ""
     hover = magnitude_hover(label)
     magnitudes, phases = _band(prediction, frf), []
     if measured is not None:
         known = np.isfinite(measured)
-        curve, phase = _curves("measured", Role.REFERENCE, x[known], measured[known], hover, opacity=0.35, width=5)
+        curve, phase = magnitude_and_phase(
+            name_of_measured, Role.REFERENCE, x[known], measured[known], hover, opacity=0.35, width=5
+        )
         magnitudes.append(curve)
         phases.append(phase)
     for name, colour, values, dash, width in (
         ("nominal model", Role.NOMINAL, prediction.nominal, "dash", 1.4),
         ("updated model", Role.UPDATED, prediction.values, "solid", 2.0),
     ):
-        curve, phase = _curves(name, colour, x, values[:, frf], hover, dash=dash, width=width)
+        curve, phase = magnitude_and_phase(name, colour, x, values[:, frf], hover, dash=dash, width=width)
         magnitudes.append(curve)
         phases.append(phase)
     return Picture(
@@ -62,43 +68,6 @@ def describe_prediction(prediction: Prediction, frf: int, measured: ComplexArray
         note="The band is what the targets and the prior leave open (90 %).",
         height_px=500,
     )
-
-
-def _curves(
-    name: str,
-    colour: Role,
-    x: FloatArray,
-    values: ComplexArray,
-    hover: str,
-    *,
-    opacity: float = 1.0,
-    dash: str = "solid",
-    width: float,
-) -> tuple[Line, Line]:
-    """Magnitude and phase."""
-    magnitude = Line(
-        name=name,
-        colour=colour,
-        opacity=opacity,
-        group=name,
-        x=x,
-        y=np.abs(values),
-        dash=dash,
-        width=width,
-        hover=hover,
-    )
-    phase = Line(
-        name=name,
-        colour=colour,
-        opacity=opacity,
-        group=name,
-        x=x,
-        y=phase_degrees(values),
-        dash=dash,
-        width=width,
-        hover=PHASE_HOVER,
-    )
-    return magnitude, phase
 
 
 def _band(prediction: Prediction, frf: int) -> list[Layer]:

@@ -14,12 +14,14 @@ from frf_ipz.plotting.diagnosis import (
     describe_ranking,
 )
 from frf_ipz.plotting.frfs import describe_fit, describe_frfs
+from frf_ipz.plotting.mac import describe_mac
 from frf_ipz.plotting.nonlinear import (
     describe_law_force,
     describe_law_response,
     describe_level_modes,
     describe_levels,
 )
+from frf_ipz.plotting.overlay import describe_overlay
 from frf_ipz.plotting.picture import select_panel
 from frf_ipz.plotting.poles import describe_pairs, describe_pole_zero_map, describe_stabilization
 from frf_ipz.plotting.prediction import describe_prediction
@@ -33,7 +35,7 @@ from frf_ipz.plotting.updating import (
     describe_targets,
 )
 from frf_ipz.prediction.reference import measured_at
-from frf_ipz.runs.picture_data import changed_parts, update_targets
+from frf_ipz.runs.picture_data import changed_parts, models_beside_measurement, shape_agreements, update_targets
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -54,6 +56,7 @@ CONTENTS = {
     "levels": "level_dependence",
 }
 MOST_PREDICTIONS = 8  # predicted FRFs drawn; all stand in the file
+MOST_OVERLAYS = 8  # measured FRFs drawn one below the other; the page shows any
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,9 +186,39 @@ def _flexibility(run: Results) -> list[Picture | None]:
 def _predictions(run: Results) -> list[Picture]:
     if run.prediction is None:
         return []
-    measured = {**measured_at(run.prediction, run.frfs), **measured_at(run.prediction, run.reference)}
+    aside = measured_at(run.prediction, run.reference)
+    measured = {**measured_at(run.prediction, run.frfs), **aside}
     count = min(len(run.prediction.labels), MOST_PREDICTIONS)
-    return [describe_prediction(run.prediction, frf, measured.get(frf)) for frf in range(count)]
+    return [
+        describe_prediction(run.prediction, frf, measured.get(frf), is_kept_aside=frf in aside) for frf in range(count)
+    ]
+
+
+def _overlays(run: Results) -> list[Picture]:
+    return list(overlay_pictures(run).values())[:MOST_OVERLAYS]
+
+
+def overlay_pictures(run: Results) -> dict[str, Picture]:
+    """Describe every measured FRF with the nominal and the updated model's.
+
+    Parameters
+    ----------
+    run : Results
+        What the run holds.
+
+    Returns
+    -------
+    dict of str to Picture
+        By the FRF; empty without a model.
+    """
+    compared = models_beside_measurement(run)
+    if compared is None:
+        return {}
+    return {text: describe_overlay(compared, frf) for frf, text in enumerate(compared.names)}
+
+
+def _mac(run: Results) -> list[Picture | None]:
+    return [describe_mac(shape_agreements(run))]
 
 
 def _structure(run: Results) -> list[Picture | None]:
@@ -231,6 +264,8 @@ PICTURES: dict[str, _Entry] = {
     "fit": _Entry(("ingest", "fit"), _fit),
     "misfit": _Entry(("ingest", "fit"), lambda run: [select_panel(picture, 1) for picture in _fit(run)]),
     "pairs": _Entry(("pair", "fit"), _pairs, "there was nothing to pair"),
+    "overlay": _Entry(("ingest", "update"), _overlays),
+    "mac": _Entry(("fit", "update"), _mac, "mode shapes were measured at one DOF only, where all are alike"),
     "targets": _Entry(
         ("update", "pair", "fit"),
         lambda run: [describe_targets(update_targets(run))],

@@ -86,7 +86,8 @@ def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEn
     ModelError
         0 where the ensemble and the noise explain what is missed.
     """
-    measured = fit.model(s) / fit.gain
+    scale = updated.scale
+    measured = fit.model(s) / (scale.gains(fit.labels) if scale.is_relative else fit.gain)
     centre = as_ensemble(updated, ensemble.lowest_rad_s)
     lines_hz = np.abs(s) / (2 * np.pi)
     power = np.zeros(len(s))
@@ -94,8 +95,9 @@ def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEn
         output, force = updated.model.row(label.output_dof), updated.model.row(label.input_dof)
         factor = s**label.quantity.power
         value = centre.receptance(output, force, s)[0] * factor
-        spread = np.var(ensemble.receptance(output, force, s) * factor, axis=0)
-        noise = np.interp(lines_hz, fit.frequency_hz, fit.value_std[:, frf]) ** 2
+        members = ensemble.receptance(output, force, s) * factor
+        spread = np.var(members * scale.drawn(label, len(members))[:, None], axis=0)
+        noise = (np.interp(lines_hz, fit.frequency_hz, fit.value_std[:, frf]) / scale.gain(label)) ** 2
         excess = np.maximum(np.abs(measured[:, frf] - value) ** 2 - spread - noise, 0.0)
         size = frf_size(updated, label, s, centre)
         power += np.divide(excess, size**2, out=np.zeros(len(s)), where=size > 0.0)

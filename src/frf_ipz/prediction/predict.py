@@ -1,7 +1,8 @@
 """Prediction: FRFs at points that were not measured, with a band for what the measurements do not determine.
 
 Sits after updating. The band is that of the update's ensemble (the covariance of the targets, and the null space of the
-update), widened by what the updated model misses of the measured FRFs.
+update), widened by what the updated model misses of the measured FRFs, and by the gains where the scale is unknown.
+FRFs are in the unit of the measurement: where its scale is unknown, the model's times the fitted gain.
 """
 
 from __future__ import annotations
@@ -99,20 +100,22 @@ def predict_frfs(
     ensemble = _ensemble(updated, s)
     low, high = _magnitude_bands(measured, updated, ensemble, predicted, s)
     zeros, zero_std = predicted_zeros(updated.model, updated.ensemble, predicted, band_rad_s)
-    warnings = tuple(
+    statement = updated.scale.statement if predicted else ""
+    warnings = (statement,) * bool(statement) + tuple(
         explain_wide_band(band, updated.model, ensemble, labels, predicted[band.frf], frequency_hz, zeros)
         for band in wide_bands(frequency_hz, low, high)
     )
     return Prediction(
         frequency_hz=frequency_hz,
         labels=predicted,
-        values=_evaluate(updated.model, predicted, s),
-        nominal=_evaluate(updated.nominal, predicted, s),
+        values=_evaluate(updated.model, predicted, s) * updated.scale.gains(predicted),
+        nominal=_evaluate(updated.nominal, predicted, s) * updated.nominal_scale.gains(predicted),
         magnitude_low=low,
         magnitude_high=high,
         zeros=zeros,
         zero_std=zero_std,
         warnings=warnings,
+        relative=tuple(place for place, label in enumerate(predicted) if not updated.scale.knows_level(label)),
     )
 
 
@@ -161,5 +164,6 @@ def _magnitude_bands(
             values = ensemble.receptance(output, force, s) * s**label.quantity.power
             if error is not None:
                 values = values + error.draw(frf_size(updated, label, s, centre), len(values))
+            values = values * abs(updated.scale.gain(label)) * updated.scale.drawn(label, len(values))[:, None]
             bands[:, :, number] = np.quantile(np.abs(values), BAND, axis=0)
     return bands[0], bands[1]

@@ -31,7 +31,10 @@ class Prediction(Tabulated, Drawn):
     zero_std : (n_zeros, 2) array
         Standard deviation of their real and imaginary parts, rad/s; NaN where the method gives none.
     warnings : tuple of str
-        Where the band is wide, why, and what would narrow it.
+        What is known of the scale; where the band is wide, why, and what would narrow it.
+    relative : tuple of int
+        Numbers of the FRFs whose shape alone is predicted, with the ratios among those of one point: the test does not
+        know the scale of a sensor there.
 
     Examples
     --------
@@ -66,6 +69,7 @@ class Prediction(Tabulated, Drawn):
     zeros: ZeroSet
     zero_std: FloatArray
     warnings: tuple[str, ...] = ()
+    relative: tuple[int, ...] = ()
 
     def __repr__(self) -> str:
         lines = f"{len(self.frequency_hz)} lines"

@@ -26,7 +26,8 @@ def measured_at(prediction: Prediction, frfs: FrfSet | None) -> dict[int, Comple
     Returns
     -------
     dict of int to (n_lines,) complex array
-        Measured values by the number of the predicted FRF, NaN on lines that were not measured.
+        Measured values by the number of the predicted FRF, NaN on lines that were not measured. Where the shape alone
+        is predicted, at the level of the prediction.
     """
     if frfs is None:
         return {}
@@ -37,7 +38,27 @@ def measured_at(prediction: Prediction, frfs: FrfSet | None) -> dict[int, Comple
         if column is not None and frfs.labels[column].quantity is label.quantity:
             sign = label.sign * frfs.labels[column].sign
             measured[number] = sign * _at(frfs, column, prediction)
-    return measured
+    return _to_known_level(prediction, measured)
+
+
+def _to_known_level(prediction: Prediction, measured: dict[int, ComplexArray]) -> dict[int, ComplexArray]:
+    """Bring the FRFs of each point whose level is not predicted to that of the prediction, by one real factor."""
+    points: dict[str, list[int]] = {}
+    for number in measured:
+        if number in prediction.relative:
+            points.setdefault(prediction.labels[number].output_dof.name, []).append(number)
+    levelled = dict(measured)
+    for numbers in points.values():
+        computed = prediction.values[:, numbers]
+        values = np.stack([measured[number] for number in numbers], axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):  # an FRF may be 0, and is NaN where it was not measured
+            logs = np.log(np.abs(computed) / np.abs(values))
+        known = np.isfinite(logs)
+        if known.any():
+            sign = -1.0 if np.sum((computed.conj() * values)[known].real) < 0 else 1.0
+            factor = sign * float(np.exp(np.median(logs[known])))
+            levelled.update({number: factor * measured[number] for number in numbers})
+    return levelled
 
 
 def _key(label: FrfLabel) -> tuple[str, str]:

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from frf_ipz.output_files import write_text
 from frf_ipz.progress import Progress, silent
-from frf_ipz.report.html import REPORT, SCRIPTS, page_environment, read_asset
+from frf_ipz.report.html import PLOTLY, REPORT, SCRIPTS, packed_asset, page_environment, read_asset
 from frf_ipz.report.page_data import page_data
 from frf_ipz.report.plotly_drawing import colour_name
 from frf_ipz.report.policy import page_policy
 from frf_ipz.report.section import Section
 from frf_ipz.report.sections import (
+    comparison,
     diagnosis,
     fit,
     frfs,
@@ -44,6 +45,7 @@ Build: TypeAlias = "Callable[[Results], Section | None]"
 
 SECTIONS: tuple[Build, ...] = (
     overview.build,
+    comparison.build,
     recordings.build,
     frfs.build,
     stabilization.build,
@@ -56,6 +58,16 @@ SECTIONS: tuple[Build, ...] = (
     state_space.build,
     provenance.build,
 )
+
+
+PARTICULARS = {
+    "customer": "Customer",
+    "equipment": "Equipment",
+    "serial_number": "Serial number",
+    "operator": "Operator",
+    "date": "Measured on",
+}  # of the test, as the page names them
+LONGEST_NAME = 90  # characters that the margin of a printed page has room for
 
 
 def write_report(run: Results, path: Path, *, progress: Progress = silent) -> None:
@@ -101,12 +113,13 @@ def render_page(run: Results, sections: Sequence[Section]) -> str:
         HTML.
     """
     template = page_environment().get_template("report/report.html")
-    scripts = [read_asset(REPORT, name) for name in SCRIPTS]
     return template.render(
         **run_values(run, sections),
         style=read_asset(REPORT, "page.css"),
-        scripts=scripts,
-        policy=page_policy(*scripts),
+        margins=page_margins(run),
+        library=packed_asset(REPORT, PLOTLY),
+        script=read_asset(REPORT, "page.js"),
+        policy=page_policy(*[read_asset(REPORT, name) for name in SCRIPTS]),
     )
 
 
@@ -128,10 +141,58 @@ def run_values(run: Results, sections: Sequence[Section]) -> dict[str, object]:
     return {
         "title": str(run.manifest.get("name", "")) or "run",
         "version": str(run.manifest.get("frf_ipz", "")),
+        "particulars": particulars(run),
         "chooser": frf_chooser(run),
         "sections": sections,
         "page_data": page_data(run, sections),
     }
+
+
+def particulars(run: Results) -> list[tuple[str, str]]:
+    """Give who measured what, when, with what and for whom.
+
+    Parameters
+    ----------
+    run : Results
+        What the run holds.
+
+    Returns
+    -------
+    list of pairs of str
+        What it is, and the text of the test; only what the test states.
+    """
+    stated = run.manifest.get("test", {})
+    return [(name, str(stated[key])) for key, name in PARTICULARS.items() if stated.get(key)]
+
+
+def page_margins(run: Results) -> str:
+    """Write what stands in the margins of each printed page: the run's name, its program, the number of the page.
+
+    Parameters
+    ----------
+    run : Results
+        What the run holds.
+
+    Returns
+    -------
+    str
+        A style sheet, in which every character of a name is a number: none can end a text and start a rule.
+    """
+    name, program = run.name[:LONGEST_NAME], f"frf_ipz {run.manifest.get('frf_ipz', '')}".strip()
+    when = str(run.manifest.get("when", ""))[:10]
+    boxes = {
+        "top-left": _css_text(name),
+        "top-right": _css_text(when),
+        "bottom-left": _css_text(program),
+        "bottom-right": '"page " counter(page) " of " counter(pages)',
+    }
+    rules = " ".join(f"@{box} {{ content: {text}; }}" for box, text in boxes.items())
+    return f"@page {{ {rules} }}"
+
+
+def _css_text(text: str) -> str:
+    """Write a text for a style sheet: control characters as spaces."""
+    return '"' + "".join(f"\\{ord(char) if char.isprintable() else 32:06x}" for char in text) + '"'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

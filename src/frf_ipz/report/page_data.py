@@ -42,7 +42,9 @@ def page_data(run: Results, sections: Sequence[Section]) -> dict[str, object]:
         What JSON can hold.
     """
     packer = Packer()
-    pictures = {picture.name: packer.pack(draw_picture(picture)) for picture in pictures_of(sections)}
+    pictures = {
+        picture.name: packer.pack(draw_picture(picture, n_alike=n_alike)) for picture, n_alike in pictures_of(sections)
+    }
     frequencies = [] if run.frfs is None else run.frfs.frequency_hz[run.frfs.frequency_hz > 0][:1].tolist()
     return {
         "pictures": pictures,

@@ -16,6 +16,7 @@ import numpy as np
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.plotting.curves import N_COLOURS
 from frf_ipz.plotting.picture import (
+    PLAIN_NUMBERS,
     Areas,
     Axis,
     Band,
@@ -53,16 +54,20 @@ THIN_SYMBOLS = {"cross": "x-thin"}
 SIDES = {"above": "top", "below": "bottom"}
 FIELDS = {"x": "x", "y": "y", "text": "text", "value": "customdata"}
 WHOLE = {"cliponaxis": False}  # words at the rim of a picture are not cut
+PLAIN_TICKS = {"tickformat": ".10~g"}  # 20, 50, 100, 200
+POWERS = {"exponentformat": "power", "minorloglabels": "complete"}  # else plotly writes 2 x 10^-7 as 2
 ALWAYS_CLEAR = {"marker": {"opacity": 1.0}}  # points outside a range that is chosen stay as clear as they were
 
 
-def draw_picture(picture: Picture) -> dict[str, Any]:
+def draw_picture(picture: Picture, *, n_alike: int = 1) -> dict[str, Any]:
     """Draw a picture for plotly.js.
 
     Parameters
     ----------
     picture : Picture
         The description.
+    n_alike : int
+        How many pictures of its kind the page holds: they share what one would have in points.
 
     Returns
     -------
@@ -72,7 +77,7 @@ def draw_picture(picture: Picture) -> dict[str, Any]:
     named = {id(layer) for layer in legend_layers(picture)} if picture.has_legend else set()
     traces: list[Trace] = []
     for index, panel in enumerate(picture.panels):
-        chosen = _thinned_points(panel)
+        chosen = _thinned_points(panel, POINTS // n_alike)
         is_beside = panel.x is not None
         drawn = [(layer, _number("y", 0 if is_beside else index)) for layer in panel.layers]
         if panel.backdrop is not None:
@@ -137,7 +142,7 @@ def _largest_of_bins(curve: FloatArray, starts: IntArray) -> IntArray:
     return hits[np.unique(bins, return_index=True)[1]]
 
 
-def _thinned_points(panel: Panel) -> dict[int, IntArray]:
+def _thinned_points(panel: Panel, n_points: int) -> dict[int, IntArray]:
     """Choose the points of each long curve of a panel; curves of one FRF that share their x are thinned together."""
     groups: dict[tuple[int, int | None], list[Line | Points | Band]] = {}
     for layer in (*panel.layers, *([] if panel.backdrop is None else [panel.backdrop])):
@@ -147,7 +152,7 @@ def _thinned_points(panel: Panel) -> dict[int, IntArray]:
     chosen: dict[int, IntArray] = {}
     for layers in groups.values():
         curves = _curves_of(layers, is_logarithmic=panel.y.scale == "log" or layers == [panel.backdrop])
-        n_bins = int(np.clip(POINTS // (2 * len(groups) * len(curves)), *BINS))
+        n_bins = int(np.clip(n_points // (2 * len(groups) * len(curves)), *BINS))
         points = thin(np.asarray(layers[0].x, float), curves, n_bins)
         chosen |= {id(layer): points for layer in layers}
     return chosen
@@ -406,25 +411,24 @@ def _(layer: Bars, panel: Panel) -> list[Trace]:
 @_draw.register(HeatMap)
 def _(layer: HeatMap, panel: Panel) -> list[Trace]:
     del panel
-    top = float(np.log10(layer.highest))
-    decades = np.arange(0.0, int(top) + 1)
+    ticks = np.linspace(0.0, layer.highest, 5) if layer.is_linear else np.arange(0.0, int(layer.highest_shade) + 1)
     is_written = layer.values.size <= MOST_CELLS
     return [
         {
             "type": "heatmap",
             "x": _texts(layer.columns),
             "y": _texts(layer.rows),
-            "z": np.log10(np.maximum(layer.values, 1e-3)),
+            "z": layer.shades,
             "text": [_texts(row) for row in layer.texts],
             "texttemplate": "%{text}" if is_written else "",
             "zmin": 0,
-            "zmax": top,
+            "zmax": layer.highest_shade,
             "colorscale": "Cividis",
             "showscale": not is_written,
             "colorbar": {
                 "title": {"text": _text(layer.scale_title)},
-                "tickvals": decades,
-                "ticktext": [f"{10**decade:g}" for decade in decades],
+                "tickvals": ticks,
+                "ticktext": [f"{tick if layer.is_linear else 10**tick:g}" for tick in ticks],
                 "thickness": 14,
             },
             **_hover(layer.hover, with_name=False),
@@ -477,8 +481,8 @@ def _axis(axis: Axis, side: str, panel: Panel) -> dict[str, Any]:
     is_logarithm = axis.scale == "log" and not axis.is_frequency
     if axis.limits is not None:
         drawn["range"] = [float(np.log10(end)) if is_logarithm else float(end) for end in axis.limits]
-    if is_logarithm and (side == "y" or axis.tick_step is not None):
-        drawn["exponentformat"] = "power"
+    if is_logarithm:
+        drawn |= PLAIN_TICKS if axis.tick_step is None and _is_plain(axis, side, panel) else POWERS
     if axis.ticks is not None:
         drawn |= {"tickvals": list(axis.ticks), "ticktext": _texts(axis.tick_labels)}
     if axis.tick_step is not None:
@@ -488,6 +492,19 @@ def _axis(axis: Axis, side: str, panel: Panel) -> dict[str, Any]:
     if axis.is_reversed:
         drawn["autorange"] = "reversed"
     return drawn | _frame(axis, side, panel)
+
+
+def _is_plain(axis: Axis, side: str, panel: Panel) -> bool:
+    """Tell whether all that a logarithmic axis shows can be read as plain numbers."""
+    if axis.limits is None:
+        names = ("x",) if side == "x" else ("y", "low", "high", "sizes")
+        parts = [getattr(layer, name, None) for layer in panel.layers for name in names]
+        shown = np.concatenate([np.ravel(part) for part in parts if isinstance(part, np.ndarray)] or [np.zeros(0)])
+        shown = shown[np.isfinite(shown) & (shown > 0)]
+        low, high = (float(shown.min()), float(shown.max())) if shown.size else (1.0, 1.0)
+    else:
+        low, high = axis.limits
+    return PLAIN_NUMBERS[0] < low and high < PLAIN_NUMBERS[1]
 
 
 def _frame(axis: Axis, side: str, panel: Panel) -> dict[str, Any]:

@@ -77,6 +77,27 @@ class Figure:
     table: Table | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Choice:
+    """Pictures of one kind of which the reader chooses one.
+
+    Parameters
+    ----------
+    name : str
+        Of the place where it is drawn: letters, digits and hyphens.
+    label : str
+        What is chosen.
+    pictures : mapping of str to Picture
+        By what the reader chooses among; the first one is drawn at first.
+    """
+
+    kind: ClassVar[str] = "choice"
+
+    name: str
+    label: str
+    pictures: Mapping[str, Picture]
+
+
 @dataclass(frozen=True, slots=True)
 class Card:
     """One number with its name and what it means."""
@@ -88,7 +109,7 @@ class Card:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Headline:
-    """The verdict of a run, and the numbers that carry it.
+    """The verdict of a run.
 
     Parameters
     ----------
@@ -96,14 +117,26 @@ class Headline:
         The verdict.
     addition : str
         What there is to add; may be empty.
-    cards : tuple of Card
-        The numbers.
     """
 
     kind: ClassVar[str] = "headline"
 
     sentence: str
     addition: str
+
+
+@dataclass(frozen=True, slots=True)
+class Cards:
+    """The numbers that carry a verdict.
+
+    Parameters
+    ----------
+    cards : tuple of Card
+        Side by side.
+    """
+
+    kind: ClassVar[str] = "cards"
+
     cards: tuple[Card, ...]
 
 
@@ -143,7 +176,7 @@ class Form:
     data: Mapping[str, object] = field(default_factory=dict)
 
 
-Block: TypeAlias = "Figure | Table | Headline | Listing | Form"
+Block: TypeAlias = "Figure | Choice | Table | Headline | Cards | Listing | Form"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -202,8 +235,8 @@ def run_figures(
     ]
 
 
-def pictures_of(sections: Sequence[Section]) -> list[Picture]:
-    """All pictures of some sections.
+def pictures_of(sections: Sequence[Section]) -> list[tuple[Picture, int]]:
+    """All pictures of some sections, and of how many the reader chooses one.
 
     Parameters
     ----------
@@ -212,7 +245,13 @@ def pictures_of(sections: Sequence[Section]) -> list[Picture]:
 
     Returns
     -------
-    list of Picture
+    list of pairs of Picture and int
         In order.
     """
-    return [block.picture for section in sections for block in section.blocks if isinstance(block, Figure)]
+    pictures: list[tuple[Picture, int]] = []
+    for block in (block for section in sections for block in section.blocks):
+        if isinstance(block, Figure):
+            pictures.append((block.picture, 1))
+        elif isinstance(block, Choice):
+            pictures += [(picture, len(block.pictures)) for picture in block.pictures.values()]
+    return pictures

@@ -108,24 +108,6 @@ def load_result(path: Path, *, stage: str = "", key: str | None = None) -> Any:
         raise FileFormatError(path, f"is damaged or from another version ({reason}); {ADVICE}") from None
 
 
-def is_result_of(stage: str, value: object) -> bool:
-    """Tell whether a value is of the type that a stage gives.
-
-    Parameters
-    ----------
-    stage : str
-        The stage.
-    value : object
-        What stands for its result.
-
-    Returns
-    -------
-    bool
-        True if it is.
-    """
-    return _name_of(type(value)) == RESULTS[stage]
-
-
 class _MisfitError(ValueError):
     """A value is not what its annotation says."""
 

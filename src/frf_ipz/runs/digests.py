@@ -10,11 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.input_files import open_input
-
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
-    from pathlib import Path
 
 
 def digest(parts: Mapping[str, Any]) -> str:
@@ -78,28 +75,6 @@ def digest_arrays(arrays: Iterable[Any]) -> str:
             total.update(f"{part.dtype.str} {part.shape}".encode())
             total.update(np.ascontiguousarray(part).tobytes())
     return total.hexdigest()
-
-
-def digest_file(path: Path) -> str:
-    """Digest a file's content.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    str
-        SHA-256, hexadecimal.
-
-    Raises
-    ------
-    FileFormatError
-        If it cannot be read.
-    """
-    with open_input(path) as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _dense_parts(array: Any) -> list[Any]:  # noqa: ANN401  arrays, sparse ones among them

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from frf_ipz import __version__
 from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.input_files import digest_file
 from frf_ipz.output_files import cannot_write, write_text
 from frf_ipz.progress import silent
 from frf_ipz.runs.codec import load_result, save_result
-from frf_ipz.runs.digests import digest_file
 from frf_ipz.runs.folder_lock import HOLDER, LOCK, lock_folder
-from frf_ipz.runs.generations import GENERATIONS, HIDDEN, Generations, current_folder
+from frf_ipz.runs.generations import HIDDEN, Generations, current_folder, forget_empty
 from frf_ipz.runs.manifest import MANIFEST, load_manifest
 from frf_ipz.runs.stage_file import SUFFIX
 
@@ -41,6 +41,13 @@ JSON_KEYS = {
     "when": "start of the run, UTC, ISO 8601",
     "pipeline": "path of the pipeline file; what was given in Python otherwise",
     "name": "name of the run",
+    "test.name": "name of the test",
+    "test.kind": "hammer, random or frf",
+    "test.operator": "who measured, as the test says; absent where it does not, as the keys below",
+    "test.date": "when",
+    "test.equipment": "with what",
+    "test.customer": "for whom",
+    "test.serial_number": "of the machine that was measured",
     "configuration": "every option of the run, defaults included, by section of pipeline.toml",
     "inputs.*": "SHA-256 digest of each input file, by its path relative to the pipeline file",
     "assessment.verdict": "usable, with care or not usable: the worst of the checks",
@@ -124,7 +131,7 @@ class RunFolder:
         """
         if self._entry(name).get("key") == key:
             with suppress(FileFormatError):
-                result: Result = load_result(self.current / _stage_file(name), key=key)
+                result: Result = load_result(self.current / _stage_file(name), stage=name, key=key)
                 damaged = self._damaged(name)
                 if damaged:
                     writers = files(result)
@@ -210,7 +217,8 @@ class RunFolder:
         """
         file = _stage_file(name)
         try:
-            return load_result(self._place(file)) if self._place(file).is_file() else self._require_current()
+            place = self._place(file)
+            return load_result(place, stage=name) if place.is_file() else self._require_current()
         except FileFormatError:
             self._require_current()
             raise
@@ -228,9 +236,12 @@ class RunFolder:
         OSError
             If a file cannot be written or replaced: then the folder is as it was.
         """
+        before = read_manifest(self.current)
+        if not self.computed and _lasting(before) == _lasting(self.manifest) and generations.is_in_place():
+            return  # who has opened the results reads on
         text = json.dumps(self.manifest, indent=1, ensure_ascii=False) + "\n"
         write_text(generations.staging / MANIFEST, text)
-        generations.adopt([MANIFEST, *_names(read_manifest(self.current))])
+        generations.adopt([MANIFEST, *_names(before)])
         generations.keep(_names(self.manifest))
         generations.commit()
 
@@ -300,6 +311,11 @@ def _names(manifest: Mapping[str, Any]) -> list[str]:
     return [*map(_stage_file, stages), *(file for stage in stages.values() for file in stage.get("files", []))]
 
 
+def _lasting(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """Give what `run.json` says beside the time at which a command was given."""
+    return {key: value for key, value in manifest.items() if key != "when"}
+
+
 @contextmanager
 def open_run(path: Path, *, progress: Progress = silent) -> Iterator[RunFolder]:
     """Open a run's folder for a command, and commit when the command succeeds.
@@ -362,9 +378,9 @@ def _removing_hidden(hidden: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        if current_folder(hidden.parent) == hidden.parent:
+        if not (current_folder(hidden.parent) / MANIFEST).is_file():
             with suppress(OSError):
-                (hidden / GENERATIONS).rmdir()
+                forget_empty(hidden.parent)
                 (hidden / HOLDER).unlink(missing_ok=True)
                 (hidden / LOCK).unlink(missing_ok=True)
                 hidden.rmdir()

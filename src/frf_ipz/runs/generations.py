@@ -3,7 +3,7 @@
 ::
 
     DIR/.frf_ipz/current            the number of the current generation
-    DIR/.frf_ipz/generations/7/     all files of it, whole, never changed again
+    DIR/.frf_ipz/generations/7/     all files of it, whole, never changed again; 0 is what was there before the first
     DIR/.frf_ipz/placing-8/         while generation 8 takes its place: new files, ready, and the old ones
 
 A commit goes in four steps, under the lock of the folder:
@@ -35,9 +35,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import FileFormatError, InputError
-from frf_ipz.input_files import read_text
-from frf_ipz.output_files import cannot_write, link_or_copy, move, replacing, sync, sync_folder, write_text
-from frf_ipz.runs.digests import digest_file
+from frf_ipz.input_files import digest_file, read_text
+from frf_ipz.output_files import (
+    BESIDE,
+    cannot_write,
+    link_or_copy,
+    move,
+    remove_litter,
+    replacing,
+    sync,
+    sync_folder,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -119,6 +128,9 @@ class Generations:
         """Clear up what a killed process has left, and make room for a new generation."""
         require_own_folder(self.path)
         number = _current_number(self.path)
+        for beside in (self.path / HIDDEN).glob(f"{BESIDE}*"):  # who holds the lock is the only one to write there
+            beside.unlink()
+        remove_litter(self.path)
         self._clear_up(number)
         self.current = current_folder(self.path)
         self.number = 1 if number is None else number + 1
@@ -126,24 +138,36 @@ class Generations:
         self.staging.mkdir(parents=True)
 
     def adopt(self, names: Iterable[str]) -> None:
-        """Make a generation of results that an older version has left, so that they can be taken back.
+        """Make a generation of what an older version has left, or of nothing, so that one is always current.
 
         Parameters
         ----------
         names : iterable of str
-            Their files.
+            Files of results that an older version has left.
         """
         if self.current != self.path:
             return
         adopted = _generation(self.path, 0)
+        adopted.mkdir()
         for name in names:
             if (self.path / name).is_file():
-                (adopted / name).parent.mkdir(parents=True, exist_ok=True)
+                (adopted / name).parent.mkdir(exist_ok=True)
                 link_or_copy(self.path / name, adopted / name)
-        if adopted.is_dir():
-            _sync_tree(adopted)
-            write_text(self.path / HIDDEN / POINTER, "0\n")
-            self.current = adopted
+        _sync_tree(adopted)
+        write_text(self.path / HIDDEN / POINTER, "0\n")
+        self.current = adopted
+
+    def is_in_place(self) -> bool:
+        """Tell whether the files that users open are those of the current generation.
+
+        Returns
+        -------
+        bool
+            False where there is none.
+        """
+        return self.current != self.path and all(
+            _is_same(self.path / name, self.current / name) for name in _files(self.current)
+        )
 
     def keep(self, names: Iterable[str]) -> None:
         """Take files of the current generation over into the new one.
@@ -155,7 +179,7 @@ class Generations:
         """
         for name in names:
             if (self.current / name).is_file() and not (self.staging / name).exists():
-                (self.staging / name).parent.mkdir(parents=True, exist_ok=True)
+                _make_room(self.staging / name)
                 link_or_copy(self.current / name, self.staging / name)
 
     def commit(self) -> None:
@@ -170,11 +194,13 @@ class Generations:
         placing = self.path / HIDDEN / f"{PLACING}{self.number}"
         names = _files(self.staging)
         changed = [name for name in names if not _is_same(self.path / name, self.staging / name)]
-        abandoned = [] if self.current == self.path else sorted(set(_files(self.current)) - set(names))
+        abandoned = sorted(set(_files(self.current)) - set(names))
         try:
+            for name in (*changed, *abandoned):
+                _make_room(placing / OLD / name)
             for name in changed:
-                for folder in (placing / READY, placing / OLD, self.path):
-                    (folder / name).parent.mkdir(parents=folder != self.path, exist_ok=True)
+                _make_room(self.path / name)
+                _make_room(placing / READY / name)
                 _make_ready(self.staging / name, placing / READY / name)
             for name in changed:
                 with _naming(self.path / name):
@@ -182,7 +208,6 @@ class Generations:
                     move(placing / READY / name, self.path / name)
             for name in abandoned:  # it would tell of an older result
                 if _is_same(self.path / name, self.current / name):
-                    (placing / OLD / name).parent.mkdir(parents=True, exist_ok=True)
                     with _naming(self.path / name):
                         move(self.path / name, placing / OLD / name)
             for folder in {(self.path / name).parent for name in (*changed, *abandoned)}:
@@ -228,6 +253,26 @@ class Generations:
                 folder.rmdir() if folder != self.path else None
 
 
+def forget_empty(path: Path) -> None:
+    """Remove what is kept of a folder in which there have never been results.
+
+    Parameters
+    ----------
+    path : Path
+        The run's folder.
+
+    Raises
+    ------
+    OSError
+        If anything is kept, which stays.
+    """
+    hidden = path / HIDDEN
+    with suppress(FileNotFoundError):
+        _generation(path, 0).rmdir()
+    (hidden / GENERATIONS).rmdir()
+    (hidden / POINTER).unlink(missing_ok=True)
+
+
 def require_own_folder(path: Path) -> None:
     """Refuse a folder in which a link leads elsewhere, where the program would write and remove.
 
@@ -270,6 +315,12 @@ def _current_number(path: Path) -> int | None:
 def _files(folder: Path) -> list[str]:
     """Files in a folder and in those below it, by their names from there."""
     return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if not _is_folder(path))
+
+
+def _make_room(path: Path) -> None:
+    """Make the folder of a file, where there is none."""
+    if not path.parent.is_dir():
+        path.parent.mkdir(parents=True)
 
 
 def _is_folder(path: Path) -> bool:

@@ -16,7 +16,7 @@ MANIFEST = "run.json"
 STAGE_NAMES = frozenset({*RESULTS, "report"})
 FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*\.[a-z0-9]+")  # what a stage writes: in the run's own folder
 TEXTS = ("frf_ipz", "python", "when", "pipeline", "name")
-TABLES = ("packages", "configuration", "inputs", "stages")
+TABLES = ("packages", "test", "configuration", "inputs", "stages")
 
 
 def load_manifest(folder: Path) -> dict[str, Any]:
@@ -43,7 +43,7 @@ def load_manifest(folder: Path) -> dict[str, Any]:
         _require(path, name, manifest.get(name, ""), str)
     for name in TABLES:
         _require(path, name, manifest.get(name, {}), dict)
-    for name in ("packages", "inputs"):
+    for name in ("packages", "test", "inputs"):
         for key, value in manifest.get(name, {}).items():
             _require(path, f"{name}.{key}", value, str)
     for name, stage in manifest.get("stages", {}).items():

@@ -2,20 +2,84 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from scipy.linalg import eigh
 
 from frf_ipz.fe.response import compute_frfs
+from frf_ipz.identification.results.shapes import mode_shapes
+from frf_ipz.modes import modal_assurance
 from frf_ipz.updating.targets import Target, target_rows
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import ComplexArray, IntArray
+    from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+    from frf_ipz.frf import FrfLabel
     from frf_ipz.runs.results import Results
     from frf_ipz.structure import ReducedModel
 
 FRFS_SHOWN_AT_FIRST = 6  # the others are a click away
+AT_REST = 1e-9  # of the largest eigenvalue: a rigid-body mode, which no fit has
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModelsBesideMeasurement:
+    """FRFs at the measured points, on all lines of the band.
+
+    Parameters
+    ----------
+    frequency_hz : (n_lines,) array
+        Hz.
+    labels : tuple of FrfLabel
+        What each connects.
+    measured, nominal, updated : (n_lines, n_frfs) complex array
+        As measured, and of the models before and after updating.
+    has_fitted_gains : bool
+        The scale of the measurement is unknown, so that each model's FRF has a gain that was fitted.
+    """
+
+    frequency_hz: FloatArray
+    labels: tuple[FrfLabel, ...]
+    measured: ComplexArray
+    nominal: ComplexArray
+    updated: ComplexArray
+    has_fitted_gains: bool
+
+    @property
+    def names(self) -> list[str]:
+        """Name each FRF; with its quantity where the same two DOFs were measured in several."""
+        texts = [str(label) for label in self.labels]
+        return [
+            text if texts.count(text) == 1 else f"{text}, {label.quantity.value} ({place + 1})"
+            for place, (text, label) in enumerate(zip(texts, self.labels, strict=True))
+        ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShapeAgreement:
+    """Measured mode shapes against those of a model.
+
+    Parameters
+    ----------
+    model : str
+        ``nominal model`` or ``updated model``.
+    n_dofs : int
+        At how many DOFs they are compared.
+    measured_hz : (n_measured,) array
+        Natural frequencies of the fit.
+    computed_hz : (n_computed,) array
+        Of the model's modes up to the first above the band, and as many as were measured at least.
+    mac : (n_measured, n_computed) array
+        Modal assurance criterion.
+    """
+
+    model: str
+    n_dofs: int
+    measured_hz: FloatArray
+    computed_hz: FloatArray
+    mac: FloatArray
 
 
 def hidden_frfs(run: Results) -> list[int]:
@@ -52,7 +116,7 @@ def fitted_lines(run: Results) -> IntArray:
     return np.arange(run.frfs.n_lines) if run.fit is None else np.flatnonzero(run.fit.used_lines)
 
 
-def model_values(run: Results, model: ReducedModel) -> ComplexArray:
+def model_values(run: Results, model: ReducedModel, lines: IntArray | None = None) -> ComplexArray:
     """Compute FRFs of a reduced model at the measured points, on the lines and at the s of the measurement.
 
     Parameters
@@ -61,15 +125,88 @@ def model_values(run: Results, model: ReducedModel) -> ComplexArray:
         The run.
     model : ReducedModel
         Nominal or updated.
+    lines : int array, optional
+        Which lines; those that were fitted where it is left out.
 
     Returns
     -------
-    (n_used, n_frfs) complex array
-        SI; empty without a measurement.
+    (n_lines, n_frfs) complex array
+        In the unit of the measurement; empty without one.
     """
     if run.frfs is None:
         return np.zeros((0, 0), complex)
-    return compute_frfs(model, run.frfs.labels, run.frfs.s[fitted_lines(run)])
+    values = compute_frfs(model, run.frfs.labels, run.frfs.s[fitted_lines(run) if lines is None else lines])
+    updated = run.updated_model
+    return values if updated is None else values * updated.scale_of(model).gains(run.frfs.labels)
+
+
+def models_beside_measurement(run: Results) -> ModelsBesideMeasurement | None:
+    """Give measured FRFs beside those of the models before and after updating.
+
+    Parameters
+    ----------
+    run : Results
+        The run.
+
+    Returns
+    -------
+    ModelsBesideMeasurement or None
+        None without a measurement or an update.
+    """
+    if run.frfs is None or run.updated_model is None:
+        return None
+    lines = np.flatnonzero(run.frfs.in_band(run.band_hz))
+    measured = np.asarray(run.frfs.values[lines])
+    nominal, updated = (
+        model_values(run, model, lines) for model in (run.updated_model.nominal, run.updated_model.model)
+    )
+    return ModelsBesideMeasurement(
+        frequency_hz=run.frfs.frequency_hz[lines],
+        labels=run.frfs.labels,
+        measured=measured,
+        nominal=nominal,
+        updated=updated,
+        has_fitted_gains=run.updated_model.scale.is_fitted,
+    )
+
+
+def shape_agreements(run: Results) -> list[ShapeAgreement]:
+    """Compare the measured mode shapes with those of the models before and after updating.
+
+    Parameters
+    ----------
+    run : Results
+        The run.
+
+    Returns
+    -------
+    list of ShapeAgreement
+        Nominal model first; empty without modes on both sides, or where fewer than two DOFs have a shape.
+    """
+    if run.fit is None or run.updated_model is None or not run.fit.n_modes:
+        return []
+    modes = mode_shapes(run.fit)
+    known = [dof for dof in modes.dofs if dof in run.updated_model.model.expanded_dofs]
+    if len(known) < 2:
+        return []
+    rows = [modes.dofs.index(dof) for dof in known]
+    agreements = []
+    for name, model in (("nominal model", run.updated_model.nominal), ("updated model", run.updated_model.model)):
+        eigenvalues, vectors = eigh(model.stiffness, model.mass)
+        moving = eigenvalues > AT_REST * eigenvalues[-1]
+        hertz = np.sqrt(eigenvalues[moving]) / (2 * np.pi)
+        count = max(int(np.sum(hertz <= run.band_hz[1])) + 1, run.fit.n_modes)
+        shapes = (np.stack([model.row(dof) for dof in known]) @ vectors[:, moving])[:, :count]
+        agreements.append(
+            ShapeAgreement(
+                model=name,
+                n_dofs=len(known),
+                measured_hz=modes.natural_frequency_hz,
+                computed_hz=hertz[:count],
+                mac=modal_assurance(modes.shapes[rows], shapes.astype(complex)),
+            )
+        )
+    return agreements
 
 
 def update_targets(run: Results) -> list[Target]:

@@ -305,8 +305,9 @@ def prediction_lines(prediction: Prediction) -> list[tuple[str, str]]:
     order = np.argsort(-np.nan_to_num(widths, nan=-1.0), kind="stable")
     lines = []
     for index in order[:MOST_PREDICTIONS]:
+        shape = ", its shape only" if index in prediction.relative else ""
         band = f", 90 % band +-{widths[index]:.2g} dB ({prediction.band_text}, median)"
-        lines.append(("prediction", f"{prediction.labels[index]}{band if np.isfinite(widths[index]) else ''}"))
+        lines.append(("prediction", f"{prediction.labels[index]}{shape}{band if np.isfinite(widths[index]) else ''}"))
     if len(order) > MOST_PREDICTIONS:
         lines.append(("", f"and {len(order) - MOST_PREDICTIONS} more, with narrower bands"))
     return [*lines, *_notes(prediction.warnings)]

@@ -6,6 +6,7 @@ import json
 import logging
 import secrets
 from dataclasses import asdict
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from anyio import CapacityLimiter, to_thread
@@ -94,7 +95,10 @@ class _Routes:
             Route(f"{run}/zoom", self._answering(_zoom, self._one_at_a_time)),
             Route(f"{run}/change", self._answering(_change), methods=["POST"]),
             Route(f"{run}/allow", self._answering(_allow), methods=["POST"]),
-            Route(f"{run}/run", self._answering(_run), methods=["POST"]),
+            *[
+                Route(f"{run}/{name}", self._answering(partial(_command, name)), methods=["POST"])
+                for name in ("run", "diagnose", "cancel", "undo", "redo")
+            ],
         ]
 
     def of_files(self) -> list[Route]:
@@ -209,8 +213,8 @@ def _allow(bench: Workbench, request: Request) -> Response:
     return _choices(bench, request)
 
 
-def _run(bench: Workbench, request: Request) -> Response:
-    bench.run()
+def _command(name: str, bench: Workbench, request: Request) -> Response:
+    getattr(bench, name)()
     return _choices(bench, request)
 
 

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from frf_ipz.errors import FileFormatError, InputError
-from frf_ipz.input_files import read_text
+from frf_ipz.errors import InputError
+from frf_ipz.pipeline.pipeline_folder import pipelines_in
 from frf_ipz.runs.folder import read_manifest
 from frf_ipz.runs.manifest import MANIFEST
-from frf_ipz.toml_files import parse_toml
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,7 +61,7 @@ def find_runs(folder: Path) -> tuple[RunPaths, ...]:
     runs, pipelines = [], []
     for here in _folders(folder):
         runs += [_run_in(here)] if (here / MANIFEST).is_file() else []
-        pipelines += [file for file in sorted(here.glob("*.toml")) if _is_pipeline(file)]
+        pipelines += pipelines_in(here)
     ran = {run.pipeline for run in runs}
     new = [RunPaths(folder=file.parent / RESULTS / file.stem, pipeline=file) for file in pipelines if file not in ran]
     if not runs and not new:
@@ -85,14 +84,3 @@ def _folders(folder: Path) -> Iterator[Path]:
 
 def _run_in(folder: Path) -> RunPaths:
     return RunPaths(folder=folder, pipeline=Path(str(read_manifest(folder).get("pipeline", ""))))
-
-
-def _is_pipeline(file: Path) -> bool:
-    try:
-        text = read_text(file)
-    except FileFormatError:
-        return False
-    try:
-        return "pipeline" in parse_toml(text, file)
-    except FileFormatError:  # the page then says what is wrong with it
-        return file.name == "pipeline.toml"

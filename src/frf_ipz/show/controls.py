@@ -41,6 +41,10 @@ class Choices:
         The pipeline file.
     is_first_run : bool
         Nothing has been run yet.
+    has_model : bool
+        There is an FE model, so that causes of a mismatch can be looked for.
+    can_undo, can_redo : bool
+        There is a change to undo, or one to make again.
     code : OwnCode, optional
         Code that a run would execute and that nobody has allowed yet.
     """
@@ -50,6 +54,9 @@ class Choices:
     command: str = ""
     text: str = ""
     is_first_run: bool = False
+    has_model: bool = False
+    can_undo: bool = False
+    can_redo: bool = False
     code: OwnCode | None = None
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.json_files import read_json
@@ -44,7 +44,7 @@ def _describe(bench: Workbench, top: Path) -> dict[str, str]:
         "pipeline": str(_below(bench.pipeline, top)),
         "folder": str(_below(bench.folder, top)),
         "computed": f"{when} UTC" if when else "at work" if bench.status.running else "not yet",
-        "verdict": _verdict(bench.folder) if manifest else "",
+        "verdict": _verdict(bench.folder, manifest) if manifest else "",
     }
 
 
@@ -59,10 +59,13 @@ def _name_in_file(bench: Workbench) -> str:
         return bench.pipeline.stem
 
 
-def _verdict(folder: Path) -> str:
-    """Take the sentence of a diagnosis, where one was made."""
+def _verdict(folder: Path, manifest: dict[str, Any]) -> str:
+    """Say whether the result can be used, and what a diagnosis has found, where one was made."""
+    assessment = manifest.get("assessment")
+    word = str(assessment.get("verdict", "")) if isinstance(assessment, dict) else ""
     try:
         diagnosis = read_json(folder / "diagnosis.json")
-        return str(diagnosis.get("statement") or SENTENCES[str(diagnosis["verdict"])])
+        found = str(diagnosis.get("statement") or SENTENCES[str(diagnosis["verdict"])])
     except (FileFormatError, KeyError):
-        return "no diagnosis was run"
+        found = "no diagnosis was run"
+    return f"{word}; {found}" if word else found

@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from frf_ipz.runs.digests import digest, digest_file
+from frf_ipz.input_files import digest_file
+from frf_ipz.runs.digests import digest
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -109,11 +109,15 @@ def _choices_of(bench: Workbench) -> Choices:
     file, problem = _read_choices(bench)
     if file is None:
         return Choices(problem=problem)
+    can_undo, can_redo = bench.steps()
     return Choices(
         entries=list_choices(file),
         command=command_line(bench.pipeline, bench.folder),
         text=bench.text(),
         is_first_run=not bench.stamp,
+        has_model=file.pipeline.model is not None,
+        can_undo=can_undo,
+        can_redo=can_redo,
         code=bench.code_to_allow(),
     )
 

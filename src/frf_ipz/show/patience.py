@@ -6,7 +6,8 @@ import asyncio
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-WAIT_S = 20.0  # for a whole request, and for a client to take what has been written: both come from this machine
+WAIT_S = 20.0  # for a whole request, and for a client to take the next block of what has been written
+BLOCK = 65536  # bytes: what one buffer of a socket holds; a client behind the slowest of tunnels takes it in that time
 GONE = b"HTTP/1.1 408 Request Timeout\r\ncontent-type: text/plain; charset=utf-8\r\nconnection: close\r\n\r\n"
 
 
@@ -50,7 +51,7 @@ class PatientProtocol(H11Protocol):
         """Begin to wait for a client that does not read."""
         super().pause_writing()
         if self._writing is None:
-            self._writing = self.loop.call_later(WAIT_S, self.transport.abort)
+            self._watch_writing()
 
     def resume_writing(self) -> None:
         """Go on: the client has read."""
@@ -77,6 +78,16 @@ class PatientProtocol(H11Protocol):
             self._reading = None
         elif self._reading is None:
             self._reading = self.loop.call_later(WAIT_S, self._give_up)
+
+    def _watch_writing(self) -> None:
+        waiting = self.transport.get_write_buffer_size()
+        self._writing = self.loop.call_later(WAIT_S, self._require_taken, waiting)
+
+    def _require_taken(self, waiting: int) -> None:
+        if waiting - self.transport.get_write_buffer_size() < BLOCK:
+            self.transport.abort()
+        else:
+            self._watch_writing()
 
     def _give_up(self) -> None:
         if self.cycle is None or self.cycle.response_complete:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from starlette.types import ASGIApp
+
     from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.show.workbench import Run
 
@@ -54,8 +56,30 @@ def serve(
     with listen(port) as listener:
         bound_port = int(listener.getsockname()[1])
         token = secrets.token_urlsafe(TOKEN_BYTES)
-        app = build_app(benches, port=bound_port, token=token)
-        config = uvicorn.Config(
+        server = make_server(build_app(benches, port=bound_port, token=token))
+        announce(f"http://{ADDRESS}:{bound_port}/{token}/")
+        try:
+            server.run(sockets=[listener])
+        finally:
+            for bench in benches:
+                bench.close()
+
+
+def make_server(app: ASGIApp) -> uvicorn.Server:
+    """Make the server of an application: it loses patience with slow clients, and with too many at once.
+
+    Parameters
+    ----------
+    app : ASGI application
+        What answers.
+
+    Returns
+    -------
+    Server
+        To be run on a socket.
+    """
+    return uvicorn.Server(
+        uvicorn.Config(
             app,
             log_level="warning",
             lifespan="off",
@@ -64,12 +88,7 @@ def serve(
             limit_concurrency=MOST_CONNECTIONS,
             timeout_graceful_shutdown=2,
         )
-        announce(f"http://{ADDRESS}:{bound_port}/{token}/")
-        try:
-            uvicorn.Server(config).run(sockets=[listener])
-        finally:
-            for bench in benches:
-                bench.close()
+    )
 
 
 def listen(port: int) -> socket.socket:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -10,10 +11,11 @@ from frf_ipz.input_files import read_text
 from frf_ipz.runs.folder import read_manifest
 from frf_ipz.runs.generations import stamp
 from frf_ipz.show.changes import to_change
+from frf_ipz.show.history import History
 from frf_ipz.show.open_run import OpenRun
 from frf_ipz.show.own_code import OwnCode, find_code
 from frf_ipz.show.pipeline_text import changed_text, parse, write_text
-from frf_ipz.show.worker import Worker
+from frf_ipz.show.worker import Cancelled, Worker
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,7 +34,7 @@ STOP_S = 5.0  # how long a run gets to notice that the server ends
 class Run(Protocol):
     """Runs a pipeline file into a folder, as `pipeline.run.run_pipeline` does."""
 
-    def __call__(self, path: Path, out: Path, *, progress: Progress) -> Results:
+    def __call__(self, path: Path, out: Path, *, diagnosing: bool | None, progress: Progress) -> Results:
         """Run.
 
         Parameters
@@ -41,6 +43,8 @@ class Run(Protocol):
             The pipeline file.
         out : Path
             The run's folder.
+        diagnosing : bool, optional
+            Look for what the model left out; by default as the pipeline file says.
         progress : Progress
             Called with the fraction done and what is being done.
 
@@ -54,8 +58,9 @@ class Run(Protocol):
 class Workbench:
     """A run to look at and to work on.
 
-    Every change is written to the pipeline file, and what depends on it is run anew. A change that the run refuses is
-    taken back, so that the file never asks for what cannot be done.
+    Every change is written to the pipeline file, and what depends on it is run anew; causes are looked for only when
+    somebody asks for that. A change that the run refuses, or that is cancelled, is taken back, so that the file never
+    asks for what cannot be done.
 
     Parameters
     ----------
@@ -81,7 +86,8 @@ class Workbench:
         self._written: str | None = None
         self._opened = opened or OpenRun()
         self._allowed = ""
-        self._worker = Worker(self._work)
+        self._history = History()
+        self._worker = Worker()
 
     @property
     def status(self) -> Status:
@@ -163,14 +169,43 @@ class Workbench:
             text = self.text()
             changed = changed_text(text, to_change(wish, self.pipeline), self.pipeline)
             if changed != text:
-                if text != self._written:
-                    self._before = text
-                write_text(self.pipeline, changed)
-                self._written = changed
-            self._worker.start()
+                self._write(text, changed)
+                self._history.record(text, changed)
+            self._start_after_change()
+
+    def undo(self) -> None:
+        """Take the last change back, and run what depends on it.
+
+        Raises
+        ------
+        InputError
+            If there is none, or another program has changed the file since.
+        """
+        self._step(self._history.before, -1, "undo")
+
+    def redo(self) -> None:
+        """Make the change again that was undone last, and run what depends on it.
+
+        Raises
+        ------
+        InputError
+            If there is none, or another program has changed the file since.
+        """
+        self._step(self._history.after, 1, "redo")
+
+    def steps(self) -> tuple[bool, bool]:
+        """Tell what the history holds.
+
+        Returns
+        -------
+        pair of bool
+            There is a change to undo, and one to redo.
+        """
+        text = self.text()
+        return self._history.before(text) is not None, self._history.after(text) is not None
 
     def run(self) -> None:
-        """Run the pipeline file as it stands.
+        """Run the pipeline file as it stands, and as the command line runs it.
 
         Raises
         ------
@@ -178,7 +213,46 @@ class Workbench:
             If it names code that nobody has allowed.
         """
         self._require_consent()
-        self._worker.start()
+        self._worker.start(partial(self._work, diagnosing=None))
+
+    def diagnose(self) -> None:
+        """Run the pipeline file, and look for what the model left out, in any time.
+
+        Raises
+        ------
+        InputError
+            If there is no FE model, or it names code that nobody has allowed.
+        """
+        if self.choices().pipeline.model is None:
+            raise InputError(f"{self.pipeline}: there is no FE model to compare with; name it as [pipeline] model")
+        self._require_consent()
+        self._worker.start(partial(self._work, diagnosing=True))
+
+    def cancel(self) -> None:
+        """Give up what is at work; a change that it was made for is taken back."""
+        self._worker.cancel()
+
+    def _step(self, find: Callable[[str], str | None], by: int, verb: str) -> None:
+        with self._changing:
+            self._require_consent()
+            text = self.text()
+            other = find(text)
+            if other is None:
+                raise InputError(f"there is nothing to {verb}: no change of this page, or the file was changed since")
+            self._write(text, other)
+            self._history.step(by)
+            self._start_after_change()
+
+    def _write(self, text: str, changed: str) -> None:
+        if text != self._written:
+            self._before = text
+        write_text(self.pipeline, changed)
+        self._written = changed
+
+    def _start_after_change(self) -> None:
+        """Run without a search for causes; where one corrects the model, it is a part of the run."""
+        diagnosing = None if self.choices().diagnose.apply else False
+        self._worker.start(partial(self._work, diagnosing=diagnosing))
 
     def code_to_allow(self) -> OwnCode | None:
         """Find code that a run would execute and that nobody has allowed yet.
@@ -236,14 +310,18 @@ class Workbench:
 
     def close(self) -> None:
         """Give up what is at work; the folder keeps what it held."""
-        self._worker.stop(STOP_S)
+        self._worker.cancel()
+        self._worker.wait(STOP_S)
 
-    def _work(self, progress: Progress) -> None:
+    def _work(self, progress: Progress, *, diagnosing: bool | None) -> None:
         with self._changing:
             requested = self._written
         self._require_consent()
         try:
-            self._run(self.pipeline, self.folder, progress=progress)
+            self._run(self.pipeline, self.folder, diagnosing=diagnosing, progress=progress)
+        except Cancelled:
+            self._take_back()
+            raise
         except FrfIpzError as error:
             raise InputError(f"{error}{self._take_back()}") from None
         with self._changing:
@@ -259,4 +337,5 @@ class Workbench:
             if before is None or not self.pipeline.is_file() or read_text(self.pipeline) != written:
                 return ""
             write_text(self.pipeline, before)
+            self._history.take_back(before)
         return " (the change was taken back)"

@@ -21,6 +21,10 @@ class Superseded(Exception):  # noqa: N818  it ends a run that nobody waits for 
     """A newer wish has come."""
 
 
+class Cancelled(Superseded):
+    """The work is wanted no more."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Status:
     """How far the work is.
@@ -44,16 +48,10 @@ class Status:
 
 
 class Worker:
-    """Does work in a thread.
+    """Does work in a thread."""
 
-    Parameters
-    ----------
-    work : callable
-        Takes a Progress; what it raises ends up in the status.
-    """
-
-    def __init__(self, work: Callable[[Progress], None]) -> None:
-        self._work = work
+    def __init__(self) -> None:
+        self._work: Callable[[Progress], None] | None = None
         self._lock = Lock()
         self._wish = 0
         self._status = Status()
@@ -64,9 +62,16 @@ class Worker:
         """How far the work is."""
         return self._status
 
-    def start(self) -> None:
-        """Work, from the beginning if it is at work already."""
+    def start(self, work: Callable[[Progress], None]) -> None:
+        """Work; what is at work already is given up.
+
+        Parameters
+        ----------
+        work : callable
+            Takes a Progress; what it raises ends up in the status.
+        """
         with self._lock:
+            self._work = work
             self._wish += 1
             if self._status.running:
                 return
@@ -74,17 +79,12 @@ class Worker:
             self._thread = Thread(target=self._loop, name="run", daemon=True)
             self._thread.start()
 
-    def stop(self, timeout_s: float) -> None:
-        """Give up what is at work, and wait for that.
-
-        Parameters
-        ----------
-        timeout_s : float
-            How long to wait at most, s.
-        """
+    def cancel(self) -> None:
+        """Give up what is at work: it ends at its next word."""
         with self._lock:
             self._wish = -1
-        self.wait(timeout_s)
+            if self._status.running:
+                self._status = replace(self._status, text="stopping")
 
     def wait(self, timeout_s: float | None = None) -> None:
         """Wait until nothing is at work.
@@ -99,21 +99,22 @@ class Worker:
 
     def _loop(self) -> None:
         while True:
-            wish = self._wish
-            error = "" if wish < 0 else self._try(wish)
+            with self._lock:
+                wish, work = self._wish, self._work
+            error = "" if wish < 0 or work is None else self._try(wish, work)
             with self._lock:
                 if self._wish in {wish, -1}:
                     self._status = Status(fraction=1.0, error=error)
                     return
 
-    def _try(self, wish: int) -> str:
+    def _try(self, wish: int, work: Callable[[Progress], None]) -> str:
         def report_status(fraction: float, text: str) -> None:
             if self._wish != wish:
-                raise Superseded
+                raise Cancelled if self._wish < 0 else Superseded
             self._status = replace(self._status, fraction=min(max(fraction, 0.0), 1.0), text=text)
 
         try:
-            self._work(report_status)
+            work(report_status)
         except Superseded:
             return ""
         except FrfIpzError as error:

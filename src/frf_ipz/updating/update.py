@@ -11,6 +11,8 @@ from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Protocol, cast
 
+import numpy as np
+
 from frf_ipz.arguments import require_type
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.identification.modal_fit import ModalFit
@@ -23,6 +25,7 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import ParameterBasis, make_structural_basis
 from frf_ipz.updating.position_uncertainty import with_position_uncertainty
 from frf_ipz.updating.problem import UpdateProblem, make_problem
+from frf_ipz.updating.scale import fit_scale
 from frf_ipz.updating.updated_model import UpdatedModel, with_free_rigid_bodies
 
 if TYPE_CHECKING:
@@ -131,9 +134,17 @@ def update_model(
     module = import_module(f"{methods.__name__}.{chosen.method.replace('-', '_')}")
     if basis is None and fe_model is not None:
         basis = make_structural_basis(fe_model, reduced_model, mass=chosen.mass)
-    problem = make_problem(reduced_model, fit, pairs or pair_roots(fit, reduced_model), basis)
+    paired = pairs or pair_roots(fit, reduced_model)
+    problem = make_problem(reduced_model, fit, paired, basis)
     problem = replace(problem, covariance=with_position_uncertainty(problem, position_uncertainty))
-    return with_free_rigid_bodies(cast("Method", module).update(problem, chosen, progress))
+    updated = with_free_rigid_bodies(cast("Method", module).update(problem, chosen, progress))
+    return replace(
+        updated,
+        scale=fit_scale(fit, paired, updated.model, updated.after, updated.ensemble),
+        nominal_scale=fit_scale(
+            fit, paired, updated.nominal, updated.before, np.zeros((0, *updated.ensemble.shape[1:]))
+        ),
+    )
 
 
 def method_names() -> tuple[str, ...]:

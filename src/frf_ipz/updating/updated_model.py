@@ -12,6 +12,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.numerics.rigid_motions import meet_no_force, without_force
 from frf_ipz.structure import ReducedModel
+from frf_ipz.updating.scale import MeasuredScale
 
 UNCERTAIN = (
     "the model is left as it was, and nothing tells how wrong it is: predictions have no band, and there are no "
@@ -76,6 +77,8 @@ class UpdatedModel(Tabulated, Drawn):
     parts : DataFrame
         Change of the stiffness of every part of the FE model, as `along_structure.change_along_structure` gives it;
         empty where the method has not changed parts.
+    scale, nominal_scale : MeasuredScale
+        Gains of the measured FRFs over the updated and the nominal model, where the test does not know its scale.
 
     Examples
     --------
@@ -111,10 +114,27 @@ class UpdatedModel(Tabulated, Drawn):
     unmet: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     parts: pd.DataFrame = field(default_factory=pd.DataFrame)
+    scale: MeasuredScale = field(default_factory=MeasuredScale)
+    nominal_scale: MeasuredScale = field(default_factory=MeasuredScale)
 
     def __repr__(self) -> str:
         counts = f"{len(self.after)} targets, {len(self.history)} iterations"
         return f"UpdatedModel: {self.method}, {self.status.value}, {counts}, {len(self.model.dofs)} DOFs"
+
+    def scale_of(self, model: ReducedModel) -> MeasuredScale:
+        """Give the gains over one of the two models.
+
+        Parameters
+        ----------
+        model : ReducedModel
+            The updated or the nominal one.
+
+        Returns
+        -------
+        MeasuredScale
+            Its gains.
+        """
+        return self.scale if model is self.model else self.nominal_scale
 
 
 def nothing_to_do(model: ReducedModel, method: str) -> UpdatedModel:

@@ -11,7 +11,6 @@ from clamped_beam import BEAM
 from frf_ipz.assessment.assess import assess
 from frf_ipz.assessment.checks import agreement, counterparts, prediction, quality
 from frf_ipz.assessment.evidence import Evidence
-from frf_ipz.assessment.measured_points import fitted_gains
 from frf_ipz.pairing.pairs import PairVerdict
 
 OUTPUTS, INPUTS, POINT = ("9:+z", "16:+z", "21:+z"), ("12:+z",), "18:+z"
@@ -169,13 +168,47 @@ def test_an_update_without_targets_is_no_use(evidence):
     assert the(quality.targets, replace(evidence, updated_model=nothing)).verdict is NOT_USABLE
 
 
-def test_an_unknown_scale_is_fitted_and_said(evidence):
-    relative = with_frf(evidence, 1, -7.0, unknown_scale="per_channel")
-    assert the(quality.scale, relative).verdict is WITH_CARE
-    assert the(agreement.amplitude, relative).verdict is the(agreement.phase, relative).verdict is USABLE
-    assert the(agreement.own_band, relative).verdict is USABLE
+def relative_run(evidence, kind, factors):
+    """The run of a test that does not know its scale, with its FRFs times some factors."""
+    frfs = replace(
+        evidence.frfs,
+        values=evidence.frfs.values * factors,
+        variance=evidence.frfs.variance * np.square(factors),
+        unknown_scale=kind,
+    )
+    fit = frf_ipz.fit_modes(frfs)
+    reduced = frf_ipz.reduce_model(fit, evidence.fe_model, points=[POINT])
+    updated = frf_ipz.update_model(fit, reduced, fe_model=evidence.fe_model)
+    predicted = frf_ipz.predict_frfs(fit, updated, points=[POINT])
+    return replace(evidence, frfs=frfs, fit=fit, updated_model=updated, prediction=predicted)
+
+
+@pytest.fixture(scope="module")
+def per_channel(evidence):
+    return relative_run(evidence, "per_channel", [1.0, -7.0, 3.0])
+
+
+def test_gains_of_channels_are_fitted_and_the_level_at_the_point_is_open(per_channel, evidence):
+    check = the(quality.scale, per_channel)
+    assert (check.verdict, check.unit) == (WITH_CARE, "dB")
+    assert "shape" in check.says
+    for ask in (agreement.amplitude, agreement.phase, agreement.own_band):
+        assert the(ask, per_channel).verdict is USABLE
     assert list(quality.scale(evidence)) == []
-    np.testing.assert_allclose(fitted_gains(evidence.updated, -7.0 * evidence.updated), -7.0, rtol=1e-12)
+
+
+def test_a_reference_is_compared_in_shape_where_the_level_is_open(per_channel):
+    check = the(prediction.reference, replace(per_channel, reference=reference(per_channel, -40.0)))
+    assert check.figure < 1e-9
+    assert "in shape" in check.says
+
+
+def test_a_common_gain_leaves_predictions_usable_in_the_unit_of_the_measurement(evidence):
+    run = relative_run(evidence, "common", [-7.0] * len(OUTPUTS))
+    assert the(quality.scale, run).verdict is USABLE
+    assert the(agreement.amplitude, run).verdict is USABLE
+    check = the(prediction.reference, replace(run, reference=reference(run, 2.0)))
+    assert check.figure == pytest.approx(20 * np.log10(2.0))
 
 
 @pytest.mark.parametrize(

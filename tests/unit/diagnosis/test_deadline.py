@@ -24,7 +24,7 @@ class Clock:
 
 @pytest.fixture
 def search(tmp_path):
-    def run(thickness_m, *, seconds=None, only_where_they_differ=False):
+    def run(thickness_m, *, seconds=None, only_where_they_differ=False, at_check=lambda: None):
         nominal = beam(tmp_path)
         frfs = measured(beam(tmp_path, thickness_m=thickness_m))
         clock = Clock()
@@ -32,7 +32,7 @@ def search(tmp_path):
             nominal,
             observed(frfs, BAND_HZ),
             EffectCatalogue(options=DiagnoseOptions(effects=EFFECTS), folder=tmp_path),
-            deadline=Deadline(seconds=seconds, clock=clock),
+            deadline=Deadline(seconds=seconds, clock=clock, at_check=at_check),
             only_where_they_differ=only_where_they_differ,
         )
         return diagnosis, clock.looks
@@ -47,6 +47,22 @@ def test_time_is_over_after_its_seconds():
     deadline.check()
     with pytest.raises(DeadlineError):
         deadline.check()
+
+
+def test_a_search_ends_between_hypotheses_where_nobody_waits(search):
+    class Unwanted(Exception):  # noqa: N818  as what ends a search for another reason than time
+        pass
+
+    looks = []
+
+    def look():
+        looks.append(1)
+        if len(looks) == 3:
+            raise Unwanted
+
+    with pytest.raises(Unwanted):
+        search(0.0052, at_check=look)
+    assert len(looks) == 3
 
 
 def test_a_search_without_time_says_what_it_did_not_look_at(search):

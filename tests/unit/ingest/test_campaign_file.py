@@ -3,6 +3,7 @@
 import pytest
 
 from frf_ipz.dofs import Dof
+from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.campaign import setup_labels
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
@@ -45,6 +46,58 @@ def test_the_channels_dofs_and_files_of_a_test(roving):
     assert test.input_dofs == (Dof(7, "z", 1),)
     assert [file.name for file in test.files] == ["1.csv", "1.csv", "2.csv", "3.csv"]
     assert all(file.is_absolute() for file in test.files)
+
+
+PARTICULARS = """
+operator = "A. Meier"
+date = {date}
+equipment = "hammer 2302-10, sensor 352A21"
+customer = "  "
+serial_number = "0047"
+"""
+
+
+@pytest.mark.parametrize(
+    ("date", "text"),
+    [
+        ("2026-11-27", "2026-11-27"),
+        ("2026-11-27T08:30:00", "2026-11-27T08:30:00"),
+        ('"2026-11-27, night shift"', "2026-11-27, night shift"),
+        ('"27 November"', "27 November"),
+    ],
+)
+def test_who_measured_and_when(tmp_path, date, text):
+    path = hammer_campaign(tmp_path, heights=(100.0,), n_samples=256)
+    add_to_test(path, PARTICULARS.format(date=date))
+    assert read_test(path).particulars == {
+        "operator": "A. Meier",
+        "date": text,
+        "equipment": "hammer 2302-10, sensor 352A21",
+        "serial_number": "0047",
+    }
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (
+            'date = "2026-13-45"',
+            r"key 'test.date': must be a day of the calendar, as YYYY-MM-DD; given is '2026-13-45'",
+        ),
+        ("date = 20261127", r"key 'test.date': must be a date such as 2026-11-27, or a text; given is 20261127"),
+        ("operator = 12", r"key 'test.operator': must be a valid string; given is 12"),
+        ('serial_no = "47"', r"unknown key 'serial_no'; did you mean 'serial_number'"),
+    ],
+)
+def test_particulars_that_are_none(tmp_path, line, message):
+    path = hammer_campaign(tmp_path, heights=(100.0,), n_samples=256)
+    add_to_test(path, line)
+    with pytest.raises(FileFormatError, match=message):
+        read_test(path)
+
+
+def add_to_test(path, lines):
+    path.write_text(path.read_text(encoding="utf-8").replace("[test]", f"[test]\n{lines}", 1), encoding="utf-8")
 
 
 def test_a_test_without_a_name_is_called_after_its_folder(tmp_path):

@@ -48,6 +48,11 @@ def lose_samples(signals):
     return np.delete(signals, slice(200, 230), axis=1)
 
 
+def lose_samples_late(signals):
+    """When most of the motion has died out; the recorder fills the record up."""
+    return np.pad(np.delete(signals, slice(500, 540), axis=1), ((0, 0), (0, 40)))
+
+
 def kill(signals):
     seed = int(1e6 * abs(signals[1, 0]))  # another one in each impact
     signals[1] = NOISE * np.random.default_rng(seed).standard_normal(signals.shape[1])
@@ -103,6 +108,13 @@ def test_an_impact_that_contradicts_is_named_and_left_out(tmp_path, change, mark
     assert list(result.records.used) == [number != 2 for number in range(impacts)]
     assert mark in result.records.marks[2]
     assert any(text.startswith("hits/hit_3.csv is left out: ") and mark in text for text in result.warnings)
+    assert truth_error(result).max() < 0.01
+
+
+def test_lost_samples_are_found_where_four_impacts_hardly_tell_that_one_is_wrong(tmp_path):
+    result = estimate(tmp_path, lose_samples_late, impacts=4)
+    assert list(result.records.used) == [True, True, False, True]
+    assert "40 samples are lost 0.2441 s after its beginning" in result.records.marks[2]
     assert truth_error(result).max() < 0.01
 
 

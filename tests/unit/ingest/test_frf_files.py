@@ -85,6 +85,19 @@ def test_long_csv(tmp_path):
     assert result.records.empty
 
 
+def test_frfs_under_the_window_of_an_analyser_give_the_damping_of_the_structure(tmp_path):
+    lines_hz = np.arange(0.5, 250.0, 0.25)
+    long_csv(tmp_path, lines_hz=lines_hz, values=Structure().accelerance(4.0 + 2j * np.pi * lines_hz))
+    for head, extra_1_s, error in (("applied_exponential_window_s = 0.25", 0.0, 1e-6), ("", 4.0, 3e-3)):
+        frfs = estimate_frfs(read_test(write_test(tmp_path, f"[[frf]]\n{entry()}", kind="frf", head=head))).frfs
+        fit = frf_ipz.fit_modes(frfs)
+        poles = fit.model.poles[: fit.n_modes]
+        omega = 2 * np.pi * np.array(Structure().frequency_hz)
+        ratio = np.array(Structure().damping_ratio)
+        expected = omega * (-ratio + 1j * np.sqrt(1 - ratio**2)) - extra_1_s
+        np.testing.assert_allclose(poles[np.argsort(poles.imag)], expected, rtol=error)
+
+
 def test_coherence_and_variance_come_along(tmp_path):
     long_csv(tmp_path, extra=("coherence", "variance"))
     frfs = read(tmp_path, entry()).frfs

@@ -5,6 +5,7 @@ import pytest
 
 from frf_ipz.diagnosis.observations import observe
 from frf_ipz.dofs import parse_dof
+from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
@@ -14,6 +15,7 @@ from synthetic_campaign import HIT, Structure, hammer_campaign, impact, pulse, w
 
 EXACT = 2e-6  # relative: 17 digits in the files, and a pulse that is cut 15 standard deviations from its middle
 RINGING = Structure(damping_ratio=(0.0006, 0.002, 0.004))  # 79 % of the first mode remains after 2 s
+RECORD = '[[record]]\ndof = "7:+z"\nfiles = ["hits/*.csv"]\n'
 BAND_HZ = (5.0, 400.0)
 
 
@@ -45,6 +47,35 @@ def test_an_exponential_window_is_taken_back_exactly(tmp_path):
     result = estimate(hammer_campaign(tmp_path, structure=structure), exponential_window_s=0.25)
     assert result.frfs.window_decay_1_s == pytest.approx(4.0)
     assert errors(result, structure).max() < EXACT
+
+
+def windowed_campaign(folder, structure, time_constant_s):
+    """Write recordings as an analyser does that has put an exponential window on the responses alone."""
+    step_s = 1 / 2048
+    for number, height in enumerate((100.0, 60.0, 150.0), start=1):
+        signals = impact(structure, height=height)
+        signals[1:] *= np.exp(-np.arange(signals.shape[1]) * step_s / time_constant_s)
+        write_csv(folder / "hits" / f"p7_{number:02d}.csv", signals, step_s, start_s=5.0)
+    return lambda head: write_test(folder, HIT, n_outputs=structure.n_outputs, head=head)
+
+
+def test_a_window_that_the_analyser_has_applied_is_taken_back(tmp_path):
+    structure = Structure()
+    write = windowed_campaign(tmp_path, structure, 0.4)
+    stated = estimate(write("applied_exponential_window_s = 0.4"))
+    assert stated.frfs.window_decay_1_s == 0.0
+    assert errors(stated, structure).max() < EXACT
+    assert errors(estimate(write("")), structure).max() > 0.2  # peaks that the window has widened
+
+
+def test_a_window_after_which_nothing_is_left_is_refused(tmp_path):
+    write = windowed_campaign(tmp_path, Structure(), 0.4)
+    with pytest.raises(InputError, match=r"applied_exponential_window_s.*has left nothing"):
+        estimate(write("applied_exponential_window_s = 0.04"))
+    with pytest.raises(InputError, match="belongs to impacts"):
+        read_test(
+            write_test(tmp_path, HIT.replace("hit", "record"), kind="random", head="applied_exponential_window_s = 0.4")
+        )
 
 
 def test_decays_that_are_cut_off_get_the_window_they_need(tmp_path):

@@ -9,6 +9,7 @@ from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.ingest.records import read_records
 from frf_ipz.ingest.signals.clipping import is_clipped
+from frf_ipz.ingest.signals.periods import find_period
 from frf_ipz.ingest.signals.windows import count_independent_segments, cut_segments
 from synthetic_campaign import Structure, respond, write_csv, write_test
 
@@ -145,6 +146,45 @@ def test_the_variance_of_segments_is_their_error(tmp_path):
     band = frfs.in_band(BAND_HZ)
     error = np.abs(frfs.values - STRUCTURE.accelerance(frfs.s))[band] ** 2
     assert np.mean(error / frfs.variance[band]) == pytest.approx(1.0, abs=0.25)
+
+
+def multisine(rng, n_period, lines):
+    """Give one period of a force with equal amplitudes and random phases."""
+    spectrum = np.zeros(n_period // 2 + 1, complex)
+    spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
+    period = np.fft.irfft(spectrum, n_period)
+    return period / period.std()
+
+
+@pytest.mark.parametrize("step", [1, 2], ids=["every line", "odd lines, so that the force comes again with minus"])
+def test_periodic_excitation_is_transformed_in_whole_periods(tmp_path, step):
+    rng = np.random.default_rng(11)
+    force = np.tile(multisine(rng, 2048, np.arange(11, 505, step)), 9)
+    signals = np.vstack([force, respond(STRUCTURE, force, STEP_S)])[:, 4096 - 700 :]  # long after the start
+    signals += 0.003 * rng.standard_normal(signals.shape) * signals.std(axis=1, keepdims=True)
+    result = estimate(write(tmp_path, [signals]))
+    assert result.choices == ("the force comes again every 2 s: parts of 2 s, whole periods",)
+    assert result.warnings == ()
+    assert len(result.frfs.frequency_hz) == 1025
+    band = result.frfs.in_band(BAND_HZ) & (np.arange(1025) % 2 == 1)
+    truth = STRUCTURE.accelerance(result.frfs.s[band])
+    error = np.abs(result.frfs.values[band] - truth)
+    assert (error / np.abs(truth).max(axis=0)).max() < 0.01
+    assert np.sqrt(np.mean(error**2 / result.frfs.variance[band])) == pytest.approx(1.0, abs=0.15)
+
+
+def test_what_does_not_come_again_has_no_period():
+    rng = np.random.default_rng(5)
+    noise = rng.standard_normal(8192)
+    assert find_period(noise) == 0
+    assert find_period(smooth_noise(rng, 8192)) == 0
+    spectrum, hertz = np.fft.rfft(noise), np.fft.rfftfreq(8192, STEP_S)
+    narrow = np.fft.irfft(spectrum * np.exp(-(((hertz - 40.0) / 1.0) ** 2)), 8192)  # alike after one cycle
+    assert find_period(narrow) == 0
+    assert find_period(np.sin(1e-2 * np.arange(8192) ** 1.5)) == 0
+    assert find_period(np.zeros(8192)) == 0
+    assert find_period(np.tile(noise[:1000], 8) + 0.02 * rng.standard_normal(8000)) == 1000
+    assert find_period(np.tile(noise[:1000], 2)[:1900]) == 0  # not once again as a whole
 
 
 def test_segments_may_be_asked_for(tmp_path):

@@ -225,7 +225,9 @@ def test_frequencies_in_rad_s(tmp_path):
 
 def test_time_histories_are_refused_as_what_they_are(tmp_path):
     text = message(tmp_path, data_set(kind=1))
-    assert "1 of type 1 (time response); recordings in universal files are not read: export them as CSV" in text
+    assert (
+        "1 of type 1 (time response); time responses are recordings: name the file under [[hit]] or [[record]]" in text
+    )
 
 
 @settings(max_examples=60, deadline=None)

@@ -157,3 +157,22 @@ def test_roots_scale_with_the_unit_of_time(matrices):
 def test_a_mass_that_is_not_positive_is_refused():
     with pytest.raises(NumericalError, match="not positive definite"):
         undamped_poles(np.diag([1.0, -1.0]), np.eye(2))
+
+
+def test_a_single_mass_has_no_zeros():
+    one = np.array([[2.0]])
+    for roots in (damped_zeros(one, one, one, one[0], one[0]), undamped_zeros(one, one, one[0], one[0])):
+        assert len(roots.values) == 0
+        assert roots.right_vectors.shape == (1, 0)
+        assert damped_sensitivity(roots, mass=one[None]).shape == (0, 1)
+
+
+def test_between_two_masses_only_the_damper_makes_a_zero():
+    mass, stiffness, damping = (
+        np.diag([2.0, 3.0]),
+        np.array([[5.0, -4.0], [-4.0, 6.0]]),
+        np.array([[1.0, -0.5], [-0.5, 1.0]]),
+    )
+    first, second = np.eye(2)
+    assert_allclose(damped_zeros(mass, damping, stiffness, first, second).values, [-8.0])  # k + s c = 0
+    assert len(damped_zeros(mass, 0.0 * damping, stiffness, first, second).values) == 0

@@ -93,7 +93,7 @@ def test_names_are_in_the_order_of_the_chain_and_those_of_a_run_are_what_it_hold
 def test_every_picture_of_the_report_has_a_name_on_the_command_line(folder):
     run = Results(folder)
     sections = [build(run) for build in SECTIONS]
-    shown = [picture.name for picture in pictures_of([section for section in sections if section is not None])]
+    shown = [picture.name for picture, _ in pictures_of([section for section in sections if section is not None])]
     assert set(shown) - {"flexibility"} == {
         picture.name for name in PICTURES if name != "flexibility" for picture in run_pictures(run, name)
     }

@@ -45,3 +45,14 @@ def test_lines_that_were_not_measured_are_not_known(results):
 def test_other_points_are_no_counterpart(results):
     assert measured_at(results["predict"], results["ingest"].frfs) == {}
     assert measured_at(results["predict"], None) == {}
+
+
+def test_where_the_level_is_open_the_measured_frf_comes_at_the_level_of_the_prediction(results):
+    reference, prediction = results["reference"], results["predict"]
+    prediction = replace(prediction, relative=(0,))
+    exact = replace(reference, values=-30.0 * prediction.values, variance=reference.variance)
+    np.testing.assert_allclose(measured_at(prediction, exact)[0], prediction.values[:, 0], rtol=1e-12)
+    measured = measured_at(prediction, reference)[0]
+    ratio = measured / reference.values[:, 0]
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-12)  # one real factor, the shape stays
+    assert np.median(np.log(np.abs(measured / prediction.values[:, 0]))) == pytest.approx(0.0, abs=1e-12)

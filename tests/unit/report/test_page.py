@@ -1,6 +1,7 @@
 """The page holds what the run holds, and nothing else."""
 
 import base64
+import gzip
 import hashlib
 import html
 import json
@@ -14,7 +15,7 @@ import plotly.graph_objects as go
 import pytest
 
 from frf_ipz.report.html import REPORT, SCRIPTS
-from frf_ipz.report.page import SECTIONS, write_report
+from frf_ipz.report.page import SECTIONS, page_margins, write_report
 from frf_ipz.runs.results import Results
 from frf_ipz.updating.updated_model import nothing_to_do
 from synthetic_run import Folder, many_frfs, synthetic_folder
@@ -28,14 +29,17 @@ class Reader(HTMLParser):
 
     def __init__(self):
         super().__init__()
-        self.ids, self.links, self.sources, self.alts = [], [], [], []
+        self.ids, self.links, self.sources, self.alts, self.options = [], [], [], [], []
 
     def handle_starttag(self, tag, attributes):
         values = dict(attributes, tag=tag)
         self.ids += [values["id"]] if "id" in values else []
         self.links += [values["href"]] if "href" in values else []
         self.sources += [values[key] for key in ("src", "srcset") if key in values]
-        self.alts += [values["aria-label"]] if values.get("aria-roledescription") == "picture" else []
+        self.options += [values["value"]] if tag == "option" else []
+        self.alts += [values["data-alt"]] if tag == "option" else []
+        is_picture = values.get("aria-roledescription") == "picture"
+        self.alts += [values["aria-label"]] if is_picture else []
 
 
 def page_of(folder, tmp_path):
@@ -63,6 +67,7 @@ def test_every_section_is_there_in_the_order_of_the_chain(page):
     anchors = re.findall(r'<section id="([^"]+)"', page)
     assert anchors == [
         "overview",
+        "comparison",
         "recordings",
         "frfs",
         "stabilization",
@@ -87,7 +92,11 @@ def test_nothing_is_fetched_from_elsewhere(page):
 def test_only_the_scripts_of_the_page_may_run(page):
     policy = re.search(r'<meta http-equiv="content-security-policy" content="([^"]+)">', page)[1]
     policy = html.unescape(policy)
-    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    (packed,) = re.findall(r'id="library">(.*?)</script>', page)
+    scripts = [
+        *re.findall(r"<script>(.*?)</script>", page, re.DOTALL),
+        gzip.decompress(base64.b64decode(packed)).decode(),
+    ]
     digests = {base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts}
     assert set(re.findall(r"'sha256-([^']+)'", policy)) == digests
     assert len(digests) == 2
@@ -117,8 +126,8 @@ def test_links_lead_somewhere_and_names_are_unique(page):
 
 def test_every_picture_has_a_place_and_words(page):
     reader, data = read(page), data_of(page)
-    assert set(data["pictures"]) <= set(reader.ids)
-    assert len(reader.alts) == len(data["pictures"])
+    assert set(data["pictures"]) <= {*reader.ids, *reader.options}
+    assert len(set(reader.alts)) == len(data["pictures"])  # of several to choose from the first is on the page twice
     assert all(len(alt) > 20 for alt in reader.alts)
 
 
@@ -143,6 +152,49 @@ def test_plotly_knows_all_that_the_pictures_ask_for(page):
         figure = go.Figure(data=plain(picture["data"]), layout=plain(picture["layout"]))
         for trace in figure.data:
             assert trace.type == "heatmap" or len(trace.y) == len(trace.x)
+
+
+def test_the_library_takes_a_third_of_its_size(page):
+    (packed,) = re.findall(r'id="library">(.*?)</script>', page)
+    library = (files(REPORT) / "assets" / "plotly-cartesian.min.js").read_bytes()
+    assert gzip.decompress(base64.b64decode(packed)) == library
+    assert len(packed) < 0.5 * len(library)
+
+
+def test_who_measured_what_for_whom_stands_on_the_page_where_the_test_states_it(tmp_path):
+    folder = synthetic_folder()
+    assert "particulars" not in page_of(folder, tmp_path).split("</style>")[1]
+    folder.manifest["test"] = {"name": "beam", "kind": "hammer", "operator": "A. Meier", "date": "2026-11-27"}
+    text = page_of(folder, tmp_path)
+    assert re.findall(r"<dt>([^<]+)</dt><dd>([^<]+)</dd></div>", text)[:2] == [
+        ("Operator", "A. Meier"),
+        ("Measured on", "2026-11-27"),
+    ]
+
+
+@pytest.mark.parametrize("root", ["/home/me/secret", "C:\\Users\\me\\secret", "D:/secret"])
+def test_no_folder_above_the_campaign_stands_on_the_page(tmp_path, root):
+    folder = synthetic_folder()
+    folder.manifest |= {
+        "pipeline": f"{root}/beam/pipelines/beam.toml",
+        "inputs": {f"{root}/beam/pipelines/../data/test.toml": "0" * 64, "/mnt/elsewhere/model.toml": "1" * 64},
+        "configuration": {"pipeline": {"test": f"{root}/beam/data/test.toml"}, "diagnose": {"extra_effects": [root]}},
+    }
+    text = html.unescape(page_of(folder, tmp_path))
+    assert "secret" not in text.replace('"secret"', "")
+    assert "elsewhere" not in text
+    assert text.count("../data/test.toml") == 2
+    assert ">model.toml<" in text
+
+
+@pytest.mark.parametrize("name", ["beam", 'a"; } body { display: none } "', "a\\", "a\n</style><script>", "𝜔 ω"])
+def test_the_margins_of_printed_pages_hold_any_name_as_text(name):
+    rules = page_margins(Results(Folder(results={}, manifest={"name": name, "when": "2026-11-27T10:00"}, stale=())))
+    (text,) = re.findall(r'@top-left { content: "((?:\\[0-9a-f]{6})*)"; }', rules)
+    said = "".join(chr(int(code, 16)) for code in text.split("\\")[1:])
+    assert said == name.replace("\n", " ")
+    assert re.sub(r'"[^"]*"', "", rules).count("}") == 5
+    assert '"page " counter(page) " of " counter(pages)' in rules
 
 
 def test_a_run_that_ends_with_the_fit_says_what_was_found(tmp_path):

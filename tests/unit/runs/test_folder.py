@@ -10,24 +10,18 @@ import pytest
 
 import frf_ipz
 from frf_ipz.errors import InputError
-from frf_ipz.runs.digests import digest, digest_file
+from frf_ipz.input_files import digest_file
+from frf_ipz.runs.digests import digest
 from frf_ipz.runs.folder import open_run, read_manifest, read_run
 from frf_ipz.runs.folder_lock import LOCK
 from frf_ipz.runs.generations import POINTER, current_folder
 from frf_ipz.runs.stage_file import SUFFIX
-
-
-def write_text(text):
-    return lambda path: path.write_text(text, encoding="utf-8")
+from small_results import number_in, stage, write_text
 
 
 def contents(folder):
     """All that is in a folder, but the lock, which has none."""
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and path.name != LOCK}
-
-
-def stage(folder, key, value):
-    return folder.stage("fit", key, lambda: value, lambda result: {"fit.txt": write_text(str(result))})
 
 
 def test_a_stage_is_computed_once_for_a_key(tmp_path):
@@ -38,15 +32,31 @@ def test_a_stage_is_computed_once_for_a_key(tmp_path):
         assert folder.computed == []
     with open_run(tmp_path) as folder:
         assert stage(folder, "b", 3) == 3
-        assert folder.computed == ["fit"]
-    assert (tmp_path / "fit.txt").read_text() == "3"
-    assert read_run(tmp_path).load("fit") == 3
+        assert folder.computed == ["model"]
+    assert (tmp_path / "model.txt").read_text() == "3"
+    assert number_in(read_run(tmp_path).load("model")) == 3
+
+
+def test_a_command_that_finds_nothing_to_do_leaves_all_as_it_was(tmp_path):
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+        folder.manifest["when"] = "then"
+    before, reading = contents(tmp_path), read_run(tmp_path)
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+        folder.manifest["when"] = "now"
+    assert contents(tmp_path) == before
+    assert number_in(reading.load("model")) == 1
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+        folder.manifest["name"] = "another"
+    assert read_manifest(tmp_path)["name"] == "another"
 
 
 def test_a_damaged_result_is_computed_again(tmp_path):
     with open_run(tmp_path) as folder:
         stage(folder, "a", 1)
-    (tmp_path / "stages" / "fit.result").write_bytes(b"no result")
+    (tmp_path / "stages" / "model.result").write_bytes(b"no result")
     with open_run(tmp_path) as folder:
         assert stage(folder, "a", 2) == 2
 
@@ -54,17 +64,17 @@ def test_a_damaged_result_is_computed_again(tmp_path):
 def test_a_file_that_was_deleted_is_written_again(tmp_path):
     with open_run(tmp_path) as folder:
         stage(folder, "a", 1)
-    (tmp_path / "fit.txt").unlink()
+    (tmp_path / "model.txt").unlink()
     with open_run(tmp_path) as folder:
         stage(folder, "a", 1)
-    assert (tmp_path / "fit.txt").read_text() == "1"
+    assert (tmp_path / "model.txt").read_text() == "1"
 
 
 def test_a_file_that_its_stage_no_longer_writes_goes_and_one_of_another_stage_stays(tmp_path):
-    writers = {"fit.txt": write_text("1"), "more.txt": write_text("2"), "shared.txt": write_text("3")}
+    writers = {"model.txt": write_text("1"), "more.txt": write_text("2"), "shared.txt": write_text("3")}
     with open_run(tmp_path) as folder:
-        folder.stage("fit", "a", lambda: 1, lambda _: writers)
-        folder.stage("pair", "a", lambda: 1, lambda _: {"shared.txt": write_text("4")})
+        stage(folder, "a", 1, writers)
+        folder.page("report", "a", {"shared.txt": write_text("4")})
     (tmp_path / "own.txt").write_text("the user's")
     with open_run(tmp_path) as folder:
         stage(folder, "b", 2)
@@ -94,8 +104,8 @@ def test_a_first_run_that_fails_leaves_no_folder(tmp_path):
 def test_a_reader_never_sees_half_a_file(tmp_path):
     with open_run(tmp_path) as folder:
         stage(folder, "a", 1)
-        assert not (tmp_path / "fit.txt").exists()
-    assert (tmp_path / "fit.txt").exists()
+        assert not (tmp_path / "model.txt").exists()
+    assert (tmp_path / "model.txt").exists()
 
 
 def test_all_is_synced_before_it_counts_and_as_windows_wants_it(tmp_path, monkeypatch):
@@ -120,7 +130,7 @@ def test_all_is_synced_before_it_counts_and_as_windows_wants_it(tmp_path, monkey
     files = [path for path in generation.rglob("*") if path.suffix != ".json"]
     assert len(files) == 3  # with the folder of the results
     assert {path.stat().st_ino for path in (*files, generation, tmp_path, tmp_path / "stages")} <= set(
-        synced[: counted[0]]
+        synced[: counted[-1]]
     )
 
 
@@ -139,26 +149,26 @@ def open_elsewhere(monkeypatch):
     return held
 
 
-@pytest.mark.parametrize("held", ["fit.txt", "abandoned.txt", "run.json", f"stages/fit{SUFFIX}"])
+@pytest.mark.parametrize("held", ["model.txt", "abandoned.txt", "run.json", f"stages/model{SUFFIX}"])
 def test_where_one_file_is_open_elsewhere_all_are_as_they_were(tmp_path, open_elsewhere, held):
-    old = {"fit.txt": write_text("1"), "abandoned.txt": write_text("1"), "same.txt": write_text("1")}
+    old = {"model.txt": write_text("1"), "abandoned.txt": write_text("1"), "same.txt": write_text("1")}
     with open_run(tmp_path) as folder:
-        folder.stage("fit", "a", lambda: 1, lambda _: old)
+        stage(folder, "a", 1, old)
     (tmp_path / "same.txt").write_text("edited by the user")
     before = contents(tmp_path)
     open_elsewhere.add(tmp_path / held)
-    new = {"another.txt": write_text("2"), "fit.txt": write_text("2"), "same.txt": write_text("1")}
+    new = {"another.txt": write_text("2"), "model.txt": write_text("2"), "same.txt": write_text("1")}
     with pytest.raises(InputError, match=r"cannot be written: .*close it") as refused, open_run(tmp_path) as folder:
-        folder.stage("fit", "b", lambda: 2, lambda _: new)
+        stage(folder, "b", 2, new)
     assert str(refused.value).startswith(str(tmp_path / held))
     assert contents(tmp_path) == before
-    assert read_run(tmp_path).load("fit") == 1
+    assert number_in(read_run(tmp_path).load("model")) == 1
     open_elsewhere.clear()
     with open_run(tmp_path) as folder:
-        folder.stage("fit", "b", lambda: 3, lambda _: new)
-    assert (tmp_path / "fit.txt").read_text() == "2"
+        stage(folder, "b", 3, new)
+    assert (tmp_path / "model.txt").read_text() == "2"
     assert not (tmp_path / "abandoned.txt").exists()
-    assert read_run(tmp_path).load("fit") == 3
+    assert number_in(read_run(tmp_path).load("model")) == 3
 
 
 def test_a_full_disk_is_said_in_one_line_and_loses_nothing(tmp_path):
@@ -170,8 +180,8 @@ def test_a_full_disk_is_said_in_one_line_and_loses_nothing(tmp_path):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with pytest.raises(InputError, match="disk is full"), open_run(tmp_path) as folder:
-        folder.stage("fit", "b", lambda: 2, lambda _: {"fit.txt": fail})
-    assert (tmp_path / "fit.txt").read_text() == "1"
+        stage(folder, "b", 2, {"model.txt": fail})
+    assert (tmp_path / "model.txt").read_text() == "1"
 
 
 def test_an_out_folder_that_cannot_be_made_is_said(tmp_path):

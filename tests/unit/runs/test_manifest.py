@@ -35,6 +35,8 @@ def test_a_good_one_is_read_whole(tmp_path):
         ({"packages": []}, "key 'packages'"),
         ({"packages": {"numpy": 2}}, "key 'packages.numpy'"),
         ({"inputs": {"test.toml": None}}, "key 'inputs.test.toml'"),
+        ({"test": "beam"}, "key 'test'"),
+        ({"test": {"operator": 3}}, "key 'test.operator'"),
         ({"configuration": "fit"}, "key 'configuration'"),
         ({"stages": ["fit"]}, "key 'stages'"),
         ({"stages": {"../fit": {}}}, "key 'stages.../fit'"),

@@ -69,6 +69,34 @@ def test_running_again_changes_nothing(client, bench, runs):
     assert (runs, bench.text()) == ([bench.pipeline], text)
 
 
+def test_what_is_undone_and_made_again_is_answered_and_run(client, bench, runs):
+    text = bench.text()
+    assert '"undo" title="Take the last change back (Ctrl-Z)" disabled' in client.get(HOME).text
+    refused = client.post(HOME + "undo", json={})
+    assert (refused.status_code, refused.json()["error"][:24]) == (400, "there is nothing to undo")
+    changed = client.post(HOME + "change", json=PIN).json()["choices"]
+    assert '(Ctrl-Z)">Undo' in changed
+    assert '(Ctrl-Y)" disabled' in changed
+    undone = client.post(HOME + "undo", json={}).json()["choices"]
+    assert bench.text() == text
+    assert '(Ctrl-Y)">Redo' in undone
+    assert "a mode pinned at 250 Hz" in client.post(HOME + "redo", json={}).json()["choices"]
+    bench.wait(SOON_S)
+    assert runs
+
+
+def test_a_search_for_causes_is_offered_where_there_is_a_model(client, bench, runs):
+    assert 'data-command="diagnose"' in client.get(HOME).text
+    assert client.post(HOME + "diagnose", json={}).status_code == 200
+    bench.wait(SOON_S)
+    assert runs == [bench.pipeline]
+    assert client.post(HOME + "cancel", json={}).status_code == 200
+    lines = bench.text().splitlines(keepends=True)
+    bench.pipeline.write_text("".join(line for line in lines if not line.startswith("model =")), encoding="utf-8")
+    assert 'data-command="diagnose"' not in client.get(HOME).text
+    assert client.post(HOME + "diagnose", json={}).status_code == 400
+
+
 def test_a_wrong_change_is_answered_with_a_sentence(client, bench):
     text = bench.text()
     answer = client.post(HOME + "change", json={"kind": "reject", "hz": 101.8})

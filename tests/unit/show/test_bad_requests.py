@@ -143,7 +143,7 @@ def test_paths_and_verbs_that_are_not_there_are_refused(client):
         answer = client.get(f"{HOME}{files}{path}")
         assert is_refused(answer), (path[:60], answer.status_code)
     for verb in VERBS:
-        for path in ("", "change", "state", "run", "page.css", "nowhere"):
+        for path in ("", "change", "state", "run", "undo", "page.css", "nowhere"):
             answer = client.request(verb, HOME + path)
             assert (
                 answer.status_code == 200

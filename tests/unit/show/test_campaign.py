@@ -131,3 +131,21 @@ def test_several_runs_are_listed_to_choose_from(campaign):
         assert client.get(f"{HOME}{number}/state").json()["stamp"] == bench.stamp
     assert client.get(f"{HOME}3/").status_code == 404
     assert client.get(f"{HOME}1/run/../../../pipeline.toml").status_code in {403, 404}
+
+
+@pytest.mark.parametrize(
+    ("assessment", "said"),
+    [
+        ({"verdict": "not usable"}, "<td>not usable; no diagnosis was run</td>"),
+        ({"verdict": "<b>"}, "<td>&lt;b&gt;; no diagnosis was run</td>"),
+        ("usable", "<td>no diagnosis was run</td>"),
+    ],
+    ids=str,
+)
+def test_the_list_says_whether_a_result_can_be_used(campaign, assessment, said):
+    folder = campaign / "results" / "old"
+    pretend_run(folder, write_pipeline(campaign, "other"))
+    manifest = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    (folder / "run.json").write_text(json.dumps({**manifest, "assessment": assessment}), encoding="utf-8")
+    client, _ = client_of(campaign)
+    assert said in client.get(HOME).text

@@ -18,8 +18,8 @@ def test_progress_can_be_read_while_it_works():
         started.set()
         assert go_on.wait(SOON_S)
 
-    worker = Worker(work)
-    worker.start()
+    worker = Worker()
+    worker.start(work)
     assert started.wait(SOON_S)
     assert (worker.status.running, worker.status.fraction, worker.status.text) == (True, 0.4, "fitting")
     go_on.set()
@@ -37,11 +37,11 @@ def test_a_newer_wish_stops_the_work_and_begins_anew():
         progress(0.5, "")
         ended.append(1)
 
-    worker = Worker(work)
-    worker.start()
+    worker = Worker()
+    worker.start(work)
     assert first_waits.wait(SOON_S)
-    worker.start()
-    worker.start()
+    worker.start(work)
+    worker.start(work)
     go_on.set()
     worker.wait(SOON_S)
     assert (len(begun), len(ended)) == (2, 1)
@@ -63,11 +63,11 @@ def test_a_failure_is_said_and_the_next_wish_is_worked_on(fault, message):
         if (now := faults.pop(0)) is not None:
             raise now
 
-    worker = Worker(work)
-    worker.start()
+    worker = Worker()
+    worker.start(work)
     worker.wait(SOON_S)
     assert worker.status.error == message
-    worker.start()
+    worker.start(work)
     worker.wait(SOON_S)
     assert worker.status.error == ""
 
@@ -81,10 +81,11 @@ def test_stopping_ends_the_work_at_its_next_word():
         progress(0.5, "")
         ended.append(1)
 
-    worker = Worker(work)
-    worker.start()
+    worker = Worker()
+    worker.start(work)
     assert waits.wait(SOON_S)
-    worker.stop(0.0)
+    worker.cancel()
+    assert worker.status.text == "stopping"
     go_on.set()
     worker.wait(SOON_S)
     assert not ended

@@ -44,7 +44,7 @@ def amplitude(evidence: Evidence) -> Iterator[Check]:
     if deviation is None:
         return
     after = deviation.updated_db
-    relative = " (a gain of each FRF is fitted: the scale is unknown)" if evidence.is_relative else ""
+    relative = " (with the gains that are fitted: the scale is unknown)" if evidence.is_relative else ""
     yield Check(
         name="amplitude at the measured points",
         verdict=judge(after, SIXTH * GAIN_MARGIN_DB, HALF * GAIN_MARGIN_DB),

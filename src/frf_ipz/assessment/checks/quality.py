@@ -118,13 +118,19 @@ def scale(evidence: Evidence) -> Iterator[Check]:
     Check
         One, where the scale is unknown.
     """
-    if evidence.is_relative:
-        yield Check(
-            name="scale",
-            verdict=Verdict.WITH_CARE,
-            says="the scale of the measurement is unknown: amplitudes at the points of interest are those of the model",
-            advice="calibrate the test, or use the prediction's shape only",
-        )
+    if not evidence.is_relative:
+        return
+    fitted, prediction = evidence.updated_model.scale, evidence.prediction
+    is_known = fitted.is_fitted and not prediction.relative
+    deviations = [fitted.std_db(label) for label in prediction.labels or evidence.frfs.labels]
+    yield Check(
+        name="scale",
+        verdict=Verdict.USABLE if is_known else Verdict.WITH_CARE,
+        figure=max(deviations) if fitted.is_fitted else float("nan"),
+        unit="dB",
+        says=fitted.statement,
+        advice="" if is_known else "calibrate the test, or use the prediction's shape only",
+    )
 
 
 def diagnosis(evidence: Evidence) -> Iterator[Check]:

@@ -8,13 +8,13 @@ covariance all follow from U and z.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.numerics.partial_fractions import pair_columns, stacked, unstacked
 
 if TYPE_CHECKING:
@@ -202,6 +202,73 @@ def response(system: CompressedSystem, terms: SmoothTerms, s: ComplexArray) -> C
     """
     columns = model_columns(s, system.poles, terms, real_modes=system.real_modes)
     return unstacked(columns @ system.coefficients().T)
+
+
+def column_gains(system: CompressedSystem, groups: list[list[int]]) -> FloatArray:
+    """Find the part of each FRF's misfit that groups of linear coefficients take off.
+
+    Parameters
+    ----------
+    system : CompressedSystem
+        The fit.
+    groups : list of list of int
+        Which of the linear coefficients.
+
+    Returns
+    -------
+    (n_groups, n_frfs) array
+        Increase of minus twice the log likelihood where those of a group are zero, the poles being held.
+    """
+    n, coefficients = system.n_linear, system.scaled_coefficients()
+    inverses = np.stack([linalg.solve_triangular(U[:n, :n], np.eye(n), check_finite=False) for U in system.U])
+    gains = np.empty((len(groups), len(coefficients)))
+    for number, columns in enumerate(groups):
+        c, rows = coefficients[:, columns], inverses[:, columns]
+        weight = np.linalg.inv(rows @ rows.transpose(0, 2, 1))
+        gains[number] = np.einsum("fi,fij,fj->f", c, np.broadcast_to(weight, (len(c), *weight.shape[1:])), c)
+    return gains
+
+
+def without_lines(
+    system: CompressedSystem, data: WeightedLines, terms: SmoothTerms, left_out: BoolArray
+) -> CompressedSystem:
+    """Take a few lines out of a system that serves all FRFs.
+
+    Parameters
+    ----------
+    system : CompressedSystem
+        Of all lines.
+    data : WeightedLines
+        Lines and weights.
+    terms : SmoothTerms
+        Terms for modes out of band.
+    left_out : (n_lines,) bool array
+        Which lines.
+
+    Returns
+    -------
+    CompressedSystem
+        Of the rest of the lines.
+    """
+    columns = model_columns(data.s[left_out], system.poles, terms, real_modes=system.real_modes, with_slopes=True)
+    columns *= np.tile(data.profile[left_out], 2)[:, None]
+    rows = stacked(data.receptance[left_out] * data.profile[left_out, None]) * data.gain
+    U = system.U[0]
+    length = np.sqrt(np.einsum("ij,ij->j", U, U))
+    gram = (U.T @ U - columns.T @ columns) / length / length[:, None]
+    try:
+        rest = linalg.cholesky(gram, check_finite=False)
+        is_accurate = bool(np.min(np.diag(rest)) > WORST_PIVOT)
+    except linalg.LinAlgError:
+        is_accurate = False
+    if not is_accurate:
+        kept = ~left_out
+        some = replace(data, s=data.s[kept], receptance=data.receptance[kept], profile=data.profile[kept])
+        return compress(some, system.poles, terms)
+    right = (U.T @ system.z.T - columns.T @ rows) / length[:, None]
+    z = linalg.solve_triangular(rest, right, trans="T", check_finite=False)
+    total = system.total - np.einsum("lf,lf->f", rows, rows)
+    return replace(system, U=(rest * length)[None], z=z.T, total=total)
 
 
 def solve_upper(U: FloatArray, z: FloatArray) -> FloatArray:

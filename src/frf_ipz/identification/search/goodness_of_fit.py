@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
-from frf_ipz.identification.likelihood.compression import CompressedSystem, response
+from frf_ipz.identification.likelihood.compression import CompressedSystem, column_gains, response
 from frf_ipz.identification.measured_lines import WeightedLines
 from frf_ipz.identification.noise import smooth_level
 from frf_ipz.identification.search.candidates import Candidates, find_candidates
@@ -48,6 +47,8 @@ class GoodnessOfFit:
         What each pole takes off minus twice the log likelihood, over what the BIC demands for it.
     damping_std : (n_poles,) array
         Standard deviation of each damping, relative.
+    factor : (n_poles, n_frfs) array
+        Level of the misfit at each pole, over that of white noise: what its gains are divided by.
     is_needed : (n_poles,) bool array
         The model is far from the lines, and would be clearly farther without the pole: whatever its significance, which
         suffers from the modes that are still missing.
@@ -59,6 +60,7 @@ class GoodnessOfFit:
     candidates: tuple[Candidates, ...]
     significance: FloatArray
     damping_std: FloatArray
+    factor: FloatArray
     is_needed: BoolArray
 
 
@@ -100,8 +102,9 @@ def assess_fit(
         misfit=misfit,
         level=level,
         candidates=candidates,
-        significance=_over_bic(gains / factor, 2 * len(data.s)),
+        significance=over_bic(gains / factor, 2 * len(data.s)),
         damping_std=_damping_std(fit) * np.sqrt(np.median(factor, axis=1)),
+        factor=factor,
         is_needed=modes_are_missing & (gains.sum(axis=1) > NEEDED * fit.misfit),
     )
 
@@ -119,18 +122,9 @@ def pole_gains(system: CompressedSystem) -> FloatArray:
     (n_poles, n_frfs) array
         Increase of minus twice the log likelihood without the pole, the other poles being held.
     """
-    n, first, count = system.n_linear, system.n_smooth, system.n_poles
-    c = system.scaled_coefficients()
-    inverses = np.stack([linalg.solve_triangular(U[:n, :n], np.eye(n), check_finite=False) for U in system.U])
-    gains = np.empty((count, len(c)))
-    for pole in range(count):
-        columns = [first + pole] if system.real_modes else [first + pole, first + count + pole]
-        rows = inverses[:, columns]
-        weight = np.linalg.inv(rows @ rows.transpose(0, 2, 1))
-        gains[pole] = np.einsum(
-            "fi,fij,fj->f", c[:, columns], np.broadcast_to(weight, (len(c), *weight.shape[1:])), c[:, columns]
-        )
-    return gains
+    first, count = system.n_smooth, system.n_poles
+    both = range(1 if system.real_modes else 2)
+    return column_gains(system, [[first + pole + part * count for part in both] for pole in range(count)])
 
 
 def peak_levels(data: WeightedLines, fit: RefinedPoles, misfit: ComplexArray) -> FloatArray:
@@ -157,8 +151,23 @@ def peak_levels(data: WeightedLines, fit: RefinedPoles, misfit: ComplexArray) ->
     return np.asarray(observed / expected)
 
 
-def _over_bic(drops: FloatArray, n_numbers: int) -> FloatArray:
-    """Take the best subset of FRFs: a local mode shows in a few of them, and need not pay for the rest."""
+def over_bic(drops: FloatArray, n_numbers: int) -> FloatArray:
+    """Compare what poles take off the misfit with what the BIC demands for them.
+
+    The best subset of FRFs counts: a local mode shows in a few of them, and need not pay for the rest.
+
+    Parameters
+    ----------
+    drops : (n_poles, n_frfs) array
+        What each pole takes off minus twice the log likelihood of each FRF.
+    n_numbers : int
+        Real numbers that an FRF has.
+
+    Returns
+    -------
+    (n_poles,) array
+        Above 1 where a pole is asked for.
+    """
     n_frfs = drops.shape[1]
     count = np.arange(1, n_frfs + 1)
     penalty = (2 * count + 2) * np.log(n_numbers) + 2 * count * np.log(n_frfs / count)

@@ -12,7 +12,8 @@ from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_po
 from frf_ipz.identification.measured_lines import WeightedLines
 from frf_ipz.identification.search.drift import Drift, find_drift
 from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, assess_fit
-from frf_ipz.identification.search.spurious_poles import find_spurious_poles
+from frf_ipz.identification.search.hum import find_hum
+from frf_ipz.identification.search.spurious_poles import DEMANDED, find_spurious_poles
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
@@ -101,9 +102,9 @@ def select_modes(
     pinned = tuple((pole.hz, pole.why) for pole in options.pinned)
     search = _Search(data=data, terms=terms, pinned=pinned, rejected=rejected, noise_is_trusted=noise_is_known)
     poles = _with_pinned(search, _without_rejected(search, poles))
-    search.noise_is_trusted = True  # start poles are not many, and errors of strong modes do not show yet
-    fit, goodness = _drop_insignificant(search, refine_poles(data, poles, terms, iterations=ROUGH_ITERATIONS))
-    search.noise_is_trusted = noise_is_known
+    # start poles are not many, and neither errors of strong modes nor tails of weak ones show yet
+    start = refine_poles(data, poles, terms, iterations=ROUGH_ITERATIONS)
+    fit, goodness = _drop_insignificant(search, start, spurious_too=False)
     for _ in range(ROUNDS):
         fit, goodness = _without_drift(search, fit, goodness)
         proposed = _proposed_poles(search, goodness)
@@ -119,8 +120,7 @@ def select_modes(
         search.record(*_added_poles(fit.poles, trial.poles))
         fit, goodness = trial, trial_goodness
     search.noise_is_trusted = search.noise_is_trusted and bool(np.median(goodness.level) < MODEL_ERROR)
-    if not search.noise_is_trusted:
-        fit, goodness = _drop_insignificant(search, fit)
+    fit, goodness = _drop_insignificant(search, fit)
     return SelectedModes(
         data=search.data, drift=search.drift, fit=fit, goodness=goodness, decisions=tuple(search.decisions)
     )
@@ -160,34 +160,46 @@ def _is_pinned(search: _Search, poles: ComplexArray) -> BoolArray:
     return is_pinned
 
 
-def _drop_insignificant(search: _Search, fit: RefinedPoles) -> tuple[RefinedPoles, GoodnessOfFit]:
+def _drop_insignificant(
+    search: _Search, fit: RefinedPoles, *, spurious_too: bool = True
+) -> tuple[RefinedPoles, GoodnessOfFit]:
     """Drop poles that are not significant, the weakest half of them at a time: one may have hidden another."""
     best = None
     while True:
         goodness = assess_fit(search.data, fit, search.terms, best=best)
-        best = best if search.noise_is_trusted else best or goodness
+        if spurious_too and not search.noise_is_trusted:
+            best = best or goodness
         rejected = _is_rejected(search, fit.poles)
         uncertain = (goodness.damping_std > UNCERTAIN) & (goodness.significance < SURE)
         weak = ((goodness.significance < 1) | uncertain) & ~goodness.is_needed
-        spurious = [""] * len(fit.poles) if search.noise_is_trusted else find_spurious_poles(search.data, fit, goodness)
+        spurious = _spurious_reasons(search, fit, goodness) if spurious_too else [""] * len(fit.poles)
         dropped = rejected | (
             (weak | np.array([bool(reason) for reason in spurious], bool)) & ~_is_pinned(search, fit.poles)
         )
         if not dropped.any():
             return fit, goodness
         dropped &= rejected | (goodness.significance <= np.median(goodness.significance[dropped]))
-        reasons = [_weakness(goodness, number) or spurious[number] for number in np.flatnonzero(dropped).tolist()]
+        reasons = [_reason(goodness, number, spurious[number]) for number in np.flatnonzero(dropped).tolist()]
         search.record(fit.poles[dropped], "dropped", reasons)
         search.refused.extend(fit.poles[dropped].tolist())
         fit = refine_poles(search.data, fit.poles[~dropped], search.terms, iterations=ROUGH_ITERATIONS)
 
 
-def _weakness(goodness: GoodnessOfFit, number: int) -> str:
+def _spurious_reasons(search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit) -> list[str]:
+    demanded = 1.0 if search.noise_is_trusted else DEMANDED
+    hum = find_hum(search.data, fit, search.terms, goodness, demanded=demanded)
+    if search.noise_is_trusted:
+        return hum
+    by_mode = find_spurious_poles(search.data, fit, goodness)
+    return [first or second for first, second in zip(by_mode, hum, strict=True)]
+
+
+def _reason(goodness: GoodnessOfFit, number: int, spurious: str) -> str:
     if goodness.significance[number] < 1:
         return f"takes off the misfit {goodness.significance[number]:.2g} of what the BIC demands"
-    if goodness.damping_std[number] > UNCERTAIN:
+    if not spurious and goodness.damping_std[number] > UNCERTAIN:
         return f"its damping is known to {goodness.damping_std[number]:.0%} only"
-    return ""
+    return spurious
 
 
 def _without_drift(search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit) -> tuple[RefinedPoles, GoodnessOfFit]:

@@ -25,7 +25,6 @@ PEAK = 0.05  # damping ratio up to which a pole makes a peak, whose error anothe
 SAME_PEAK, WEAK = 0.5, 50.0  # that distance at which two poles are one peak, unless the weaker is so significant
 SIDE_BAND_DISTANCE = 0.1  # relative distance up to which a strong mode has side bands
 SIDE_BAND_ENERGY = 1e-5  # energy of their peaks over that of the mode's
-SPIKE = 0.15  # half width in lines below which a pole is a single line: hum, not a mode
 DEMANDED = 6.0  # times what the BIC demands, where the misfit is not noise alone
 
 
@@ -48,13 +47,10 @@ def find_spurious_poles(data: WeightedLines, fit: RefinedPoles, goodness: Goodne
     """
     poles, significance = fit.poles, goodness.significance
     energy = np.sum((np.abs(fit.system.residues()) * data.gain / -poles.real[:, None]) ** 2, axis=1)
-    line = float(np.median(np.diff(data.s.imag)))
     reasons = []
     for number, pole in enumerate(poles):
         distance = np.abs(poles.imag - pole.imag)
         reason = _stronger_mode_reason(number, poles, distance, significance, energy)
-        if not reason and -pole.real < SPIKE * line:
-            reason = f"is a single line: its half width is {-pole.real / line:.2g} of the distance of lines"
         if not reason and significance[number] < DEMANDED and not goodness.is_needed[number]:
             reason = (
                 f"takes off the misfit {significance[number]:.2g} times what the BIC demands: within the model error"

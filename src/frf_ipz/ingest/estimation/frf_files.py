@@ -16,6 +16,7 @@ from frf_ipz.ingest.estimation.record_table import empty_record_table
 from frf_ipz.ingest.formats.frf_conventions import read_frf_source
 from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.frf_estimate import FrfEstimate
+from frf_ipz.ingest.signals.windows import correlated_lines
 from frf_ipz.ingest.units import frf_factor
 from frf_ipz.quantities import FrfQuantity, as_quantity
 
@@ -69,9 +70,16 @@ def estimate_frf_files(test: VibrationTest, options: IngestOptions, progress: Pr
         progress(position / len(test.frf_sources), f"reading {source.path.name}")
         frfs += [_to_si(frf) for frf in read_frf_source(source) if frf.label in test.labels]
     joined, warnings = _join(frfs)
-    return FrfEstimate(
-        frfs=replace(joined, unknown_scale=test.unknown_scale), records=empty_record_table(), warnings=warnings
-    )
+    joined = replace(joined, unknown_scale=test.unknown_scale)
+    if test.applied_window_s is not None:
+        joined = _with_applied_window(joined, 1.0 / test.applied_window_s)
+    return FrfEstimate(frfs=joined, records=empty_record_table(), warnings=warnings)
+
+
+def _with_applied_window(frfs: FrfSet, decay_1_s: float) -> FrfSet:
+    """Say that the FRFs hold at sigma + i omega: the analyser has windowed the responses, and pulses are short."""
+    duration_s = 1.0 / np.median(np.diff(frfs.frequency_hz)) if len(frfs.frequency_hz) > 1 else 0.0
+    return replace(frfs, window_decay_1_s=decay_1_s, correlated_lines=correlated_lines(decay_1_s * duration_s))
 
 
 def read_frfs(

@@ -29,6 +29,9 @@ class _LongCsv:
 
     def read(self, source: FrfSource) -> tuple[MeasuredFrf, ...]:
         layout = sniff(source.path)
+        if not layout.header:
+            expected = ",".join((*NUMBERS, *LABELS))
+            raise FileFormatError(source.path, f"has no line that names its columns; expected are {expected}")
         names = layout.header[-1]
         table = _read_table(layout, names)
         groups: dict[tuple[str, str], list[int]] = {}

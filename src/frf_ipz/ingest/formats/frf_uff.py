@@ -10,7 +10,14 @@ import numpy as np
 from frf_ipz.dofs import DIRECTIONS, Dof
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf, note_at_rest
-from frf_ipz.ingest.formats.universal_file import describe_functions, read_functions
+from frf_ipz.ingest.formats.universal_file import (
+    COHERENCE,
+    FRF,
+    TIME_RESPONSE,
+    describe_functions,
+    is_universal,
+    read_functions,
+)
 from frf_ipz.ingest.units import frequency_factor, frf_factor, is_stated
 from frf_ipz.input_files import read_bytes
 from frf_ipz.quantities import FrfQuantity
@@ -20,7 +27,6 @@ if TYPE_CHECKING:
 
     from frf_ipz.ingest.formats.universal_file import UniversalFunction
 
-FRF, COHERENCE, TIME_RESPONSE = 4, 6, 1  # types of functions
 UNKNOWN = {0, 1}  # types of data: unknown, general
 RESPONSES = {8: FrfQuantity.RECEPTANCE, 11: FrfQuantity.MOBILITY, 12: FrfQuantity.ACCELERANCE}
 FORCES = {9, 13}  # reaction force, excitation force
@@ -44,30 +50,16 @@ class _UniversalFile:
 FORMAT = _UniversalFile()
 
 
-def is_universal(head: bytes) -> bool:
-    """Tell whether a file is a universal file.
-
-    Parameters
-    ----------
-    head : bytes
-        Its first bytes.
-
-    Returns
-    -------
-    bool
-        True if its first line that is not empty is ``-1`` and its second a number of a data set.
-    """
-    lines = head.lstrip(b"\r\n \t").replace(b"\r", b"\n").split(b"\n", 3)
-    lines = [line.strip() for line in lines if line.strip()]
-    return len(lines) > 1 and lines[0] == b"-1" and lines[1][:1].isdigit()
-
-
 def _select(source: FrfSource, functions: Sequence[UniversalFunction]) -> tuple[list[UniversalFunction], list[str]]:
     """Take the FRFs that are asked for; one that stands there twice is taken once."""
     frfs = [function for function in functions if function.function_type == FRF]
     if not frfs:
         recordings = any(function.function_type == TIME_RESPONSE for function in functions)
-        way_out = "recordings in universal files are not read: export them as CSV" if recordings else "export the FRFs"
+        way_out = (
+            "time responses are recordings: name the file under [[hit]] or [[record]]"
+            if recordings
+            else "export the FRFs"
+        )
         problem = (
             f"holds no data set 58 with a frequency response function (type 4), but {describe_functions(functions)}"
         )

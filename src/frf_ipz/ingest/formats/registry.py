@@ -7,6 +7,8 @@ import pkgutil
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest import formats
 from frf_ipz.ingest.formats.frf_file import FrfFormat
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
 
     from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf
     from frf_ipz.ingest.formats.recording import RawRecording
+
+
+LARGEST = 1e100  # the square of a larger value may overflow
 
 
 def open_recording(path: Path, columns: Sequence[str], keys: TableKeys | None = None) -> RawRecording:
@@ -73,10 +78,22 @@ def read_frf_file(source: FrfSource) -> tuple[MeasuredFrf, ...]:
     for candidate in _formats(FrfFormat):
         if candidate.holds(source, head):
             frfs: tuple[MeasuredFrf, ...] = candidate.read(source)
+            for frf in frfs:
+                _require_sizes(frf)
             return frfs
     raise FileFormatError(
         source.path, "is of no known format for FRFs; export it as CSV, as text with 'columns', or as UFF 58"
     )
+
+
+def _require_sizes(frf: MeasuredFrf) -> None:
+    """Refuse numbers whose squares overflow; none of them is a measurement."""
+    for name in ("frequency_hz", "values", "variance", "coherence"):
+        numbers = getattr(frf, name)
+        if numbers is not None and np.max(np.abs(numbers), initial=0.0) > LARGEST:
+            place = int(np.argmax(np.abs(numbers)))
+            problem = f"of {frf.output_dof} / {frf.input_dof} holds {numbers[place]:.4g}, which no measurement gives"
+            raise FileFormatError(frf.source.path, f"{name} {problem}; correct the file")
 
 
 @cache

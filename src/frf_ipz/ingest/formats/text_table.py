@@ -197,9 +197,7 @@ def _bad_length(layout: TextLayout, number: int, length: int, expected: int, *, 
 
 
 def _bad_field(path: Path, line: int, name: str, problem: str) -> FileFormatError:
-    return FileFormatError(
-        path, f"{problem}, or leave the file out by [ingest] drop", where=f"line {line}, column '{name}'"
-    )
+    return FileFormatError(path, f"{problem}, or leave the file out of the test", where=f"line {line}, column '{name}'")
 
 
 def _numbered_rows(layout: TextLayout) -> Iterator[tuple[int, str]]:

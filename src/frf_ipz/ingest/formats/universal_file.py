@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 END = b"-1"  # alone on its line: a data set begins or ends
 N_HEAD = 11  # lines of a data set 58 before its numbers
+TIME_RESPONSE, FRF, COHERENCE = 1, 4, 6  # types of functions
 FUNCTION_TYPES = {
     0: "general",
     1: "time response",
@@ -52,9 +53,10 @@ N_TOKENS = 10  # of record 6, where no name has a blank
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Axis:
-    """What an axis of a function is: type of data and label of its unit."""
+    """What an axis of a function is: type of data, its label and that of its unit."""
 
     data_type: int
+    label: str
     unit: str
 
 
@@ -100,6 +102,24 @@ class UniversalFunction:
     def ends(self) -> tuple[int, int, int, int]:
         """Node and direction of the response, node and direction of the reference."""
         return self.response_node, self.response_direction, self.reference_node, self.reference_direction
+
+
+def is_universal(head: bytes) -> bool:
+    """Tell whether a file is a universal file.
+
+    Parameters
+    ----------
+    head : bytes
+        Its first bytes.
+
+    Returns
+    -------
+    bool
+        True if its first line that is not empty is ``-1`` and its second a number of a data set.
+    """
+    lines = head.lstrip(b"\r\n \t").replace(b"\r", b"\n").split(b"\n", 3)
+    lines = [line.strip() for line in lines if line.strip()]
+    return len(lines) > 1 and lines[0] == b"-1" and lines[1][:1].isdigit()
 
 
 def read_functions(path: Path, data: bytes) -> tuple[UniversalFunction, ...]:
@@ -285,9 +305,9 @@ def _read_axis(lines: _Lines) -> Axis:
     line = lines.take()
     fields = _split_by_widths(line, (10, 5, 5, 5, 1, 20, 1, 20))
     data_type = _integers(fields[:1])
-    if data_type is None:
+    if not data_type:
         raise lines.fault(f"'{line.strip()}' does not begin with the type of an axis")
-    return Axis(data_type=data_type[0], unit=line[47:].strip())
+    return Axis(data_type=data_type[0], label=line[26:46].strip(), unit=line[47:].strip())
 
 
 def _read_text(lines: _Lines, kind: str, ordinate_type: int, is_even: bool, count: int) -> FloatArray:  # noqa: FBT001

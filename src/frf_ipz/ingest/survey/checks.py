@@ -9,6 +9,7 @@ import numpy as np
 from frf_ipz.ingest.signals.clipping import digital_step, is_clipped
 from frf_ipz.ingest.signals.decay import Decay, measure_decay
 from frf_ipz.ingest.signals.faults import find_dropout, find_missing_force, is_settling
+from frf_ipz.ingest.signals.periods import find_period
 from frf_ipz.ingest.signals.pulses import find_pulse, pulse_extent
 from frf_ipz.ingest.survey.record_info import RecordInfo
 from frf_ipz.ingest.units import si_unit
@@ -137,6 +138,9 @@ def check_record(
     means = signals[1:].mean(axis=1)
     spread = signals[1:].std(axis=1)
     offsets = np.where(np.abs(means) > 0.1 * spread, means, 0.0)
+    period = find_period(force)
+    # what comes again, with either sign, has its highest value again, which is no end of a range
+    once = slice(-find_period(np.abs(force)), None)
     return RecordInfo(
         name=name,
         setup=index.setup,
@@ -153,9 +157,10 @@ def check_record(
         pulse_s=float("nan"),
         force_noise=float("nan"),
         starts_at_rest=starts_at_rest,
-        faults=_find_clipping(test, force),
-        channel_faults=_find_bad_channels(test, index.step_s, responses, 0),
+        faults=_find_clipping(test, force[once]),
+        channel_faults=_find_bad_channels(test, index.step_s, responses[:, once], 0),
         remarks=_find_offsets(test, signals[1:], tuple(offsets)),
+        period=period,
     )
 
 

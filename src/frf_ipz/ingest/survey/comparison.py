@@ -12,10 +12,12 @@ from frf_ipz.ingest.signals.decay import noise_power
 from frf_ipz.ingest.signals.lost_samples import find_lost_samples
 from frf_ipz.ingest.signals.windows import window_impact
 from frf_ipz.ingest.survey.contradictions import (
+    FEWEST,
     ImpactSpectra,
     compare_output,
     contradicts_pairwise,
     follows_force,
+    leave_out,
     noise_scales,
 )
 
@@ -108,7 +110,7 @@ def _compare_setup(
     files: RecordingFiles, survey: Survey, records: Sequence[RecordInfo], spectra: ImpactSpectra
 ) -> list[RecordInfo]:
     columns = [channel.column for channel in files.test.output_channels]
-    comparisons = [compare_output(spectra, output) for output in range(len(columns))]
+    comparisons = [_compare_output(files, survey, records, spectra, output) for output in range(len(columns))]
     causes = [_name_causes(columns, spectra, comparisons, impact) for impact in range(len(records))]
     for impact, named in enumerate(causes):
         for output, comparison in enumerate(comparisons):
@@ -126,6 +128,27 @@ def _compare_setup(
         )
         for impact, record in enumerate(records)
     ]
+
+
+def _compare_output(
+    files: RecordingFiles, survey: Survey, records: Sequence[RecordInfo], spectra: ImpactSpectra, output: int
+) -> OutputComparison | None:
+    """Compare one response of all impacts; of few, one with lost samples is told only by trying just that."""
+    comparison = compare_output(spectra, output)
+    n_tried = int(spectra.valid.sum())
+    for impact in comparison.agreeing if comparison is not None else ():
+        if comparison is None or len(comparison.agreeing) <= FEWEST:
+            break
+        without = leave_out(spectra, output, comparison, impact)
+        response, noise = spectra.responses[impact, output], spectra.noise[impact, output]
+        misfit = without.misfit(spectra.force[impact], response, noise)
+        if not without.explains(misfit, 1.0, n_tried):  # however well it is explained
+            continue
+        agreeing = [records[number] for number in without.agreeing]
+        _, lost, share = _find_lost(files, survey, agreeing, records[impact], output)
+        if lost and without.explains(misfit, max(misfit * share, 1.0), n_tried):
+            comparison = without
+    return comparison
 
 
 def _name_causes(

@@ -14,7 +14,7 @@ densities of D with and without must exceed the number of explanations over the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -171,6 +171,34 @@ def compare_output(spectra: ImpactSpectra, output: int) -> OutputComparison | No
         reversed_sign=tuple(reversed_sign),
         frf=reference.frf,
         scatter=reference.scatter,
+    )
+
+
+def leave_out(spectra: ImpactSpectra, output: int, comparison: OutputComparison, impact: int) -> OutputComparison:
+    """Compare as if one of the impacts that agree did not.
+
+    Parameters
+    ----------
+    spectra : ImpactSpectra
+        All impacts.
+    output : int
+        Which response.
+    comparison : OutputComparison
+        That of all impacts.
+    impact : int
+        One of those that agree, of at least three.
+
+    Returns
+    -------
+    OutputComparison
+        The FRF and the scatter of the others, which the impact contradicts.
+    """
+    others = [number for number in comparison.agreeing if number != impact]
+    reference = _agreement(spectra.force[others], spectra.responses[others, output], others)
+    return replace(
+        reference,
+        contradicting=tuple(sorted([*comparison.contradicting, impact])),
+        reversed_sign=comparison.reversed_sign,
     )
 
 

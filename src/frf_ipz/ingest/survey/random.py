@@ -103,7 +103,12 @@ def _segment_length(survey: Survey, segment_s: float) -> int:
 
 
 def _use_subrecords(survey: Survey) -> Survey:
-    """Cut records into equal sub-records, as few as their length and the need of some scatter allow."""
+    """Cut records into whole periods, or into as few equal sub-records as their length and some scatter allow."""
+    periods = {record.period for record in survey.used}
+    if len(periods) == 1 and (period := periods.pop()) > 0:
+        length = -(-SHORTEST // period) * period
+        text = f"the force comes again every {period * survey.step_s:.4g} s: parts of {length * survey.step_s:.4g} s"
+        return replace(survey, subrecord_length=length, n_samples=length, choices=(f"{text}, whole periods",))
     shortest = min(record.n_samples for record in survey.used)
     fewest = min(Counter(record.setup for record in survey.used).values())
     count = max(-(-shortest // LONGEST), -(-FEWEST // fewest))

@@ -66,6 +66,8 @@ class RecordInfo:
         Samples of the force that its record lacks because it begins within the pulse, N.
     noise_scales : tuple of float
         Noise power of each response over that of the other impacts; empty where they cannot be compared.
+    period : int
+        Samples after which the force of a shaker comes again; 0 where it does not.
     """
 
     name: str
@@ -95,6 +97,7 @@ class RecordInfo:
     keeps_channels: bool = False
     missing_force: tuple[float, ...] = (0.0,)
     noise_scales: tuple[float, ...] = ()
+    period: int = 0
 
     @property
     def n_samples(self) -> int:

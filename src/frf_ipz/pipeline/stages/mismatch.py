@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from frf_ipz.diagnosis.apply import correct_frfs, correct_model
 from frf_ipz.diagnosis.deadline import Deadline
@@ -14,6 +14,7 @@ from frf_ipz.diagnosis.effect_selection import EffectCatalogue
 from frf_ipz.diagnosis.measured.levels import compare_levels
 from frf_ipz.diagnosis.observations import observe
 from frf_ipz.frf import FrfSet
+from frf_ipz.input_files import entering
 from frf_ipz.output_files import write_text
 
 if TYPE_CHECKING:
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 
+    _Run: TypeAlias = Literal["auto", "always"]
+
+STAGES = ("diagnose", "levels")
 RUN_SECONDS = 60.0  # wall time of a search in a run, where the user states none
 
 
@@ -52,39 +56,79 @@ def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet, *, is_as
     inputs = runner.inputs
     options = inputs.options.diagnose
     ingest_options = inputs.options.ingest
-
-    def rests_on(run: Literal["auto", "always"], seconds: float | None) -> dict[str, object]:
-        # what a limit of time has cut is not what the search without one gives; whether it is applied is no matter
-        return {
-            "options": asdict(replace(options, apply=False, run=run, seconds=seconds)),
-            "effects": [repr(type(effect)) for effect in inputs.effects],
-            "model": inputs.model_key,
-            "after": runner.after("ingest"),
-            "fit": [inputs.options.fit.band_hz, inputs.options.fit.exclude_hz],
-        }
-
-    # a run takes over what the verb has found in any time, before it searches again in a short one
-    is_whole = is_asked or runner.holds("diagnose", rests_on("always", options.seconds))
-    seconds = RUN_SECONDS if options.seconds is None and not is_whole else options.seconds
-    only_where_they_differ = options.run == "auto" and not is_whole
+    run, seconds = _limits(runner, is_asked=is_asked)
 
     def compute(progress: Progress) -> Diagnosis:
+        words = _Words(progress=progress)
         observations = observe(inputs.test, ingest=ingest_options, frfs=frfs, fit=inputs.options.fit)
         return find_causes(
             model,
             observations,
             EffectCatalogue(options=options, folder=inputs.folder, own=inputs.effects),
-            deadline=Deadline(seconds=seconds),
-            only_where_they_differ=only_where_they_differ,
-            progress=progress,
+            deadline=Deadline(seconds=seconds, at_check=words.repeat),
+            only_where_they_differ=run == "auto",
+            progress=words,
         )
 
     return runner.stage(
         "diagnose",
-        rests_on("auto" if only_where_they_differ else "always", seconds),
+        _rests_on(runner, run, seconds),
         compute,
         lambda result: {"diagnosis.json": partial(_write_json, result.to_json())},
     )
+
+
+@dataclass(kw_only=True, eq=False)
+class _Words:
+    """The last words of a search, said again between its hypotheses, so that whoever listens can end it there."""
+
+    progress: Progress
+    fraction: float = 0.0
+    text: str = ""
+
+    def __call__(self, fraction: float, text: str) -> None:
+        self.fraction, self.text = fraction, text
+        self.repeat()
+
+    def repeat(self) -> None:
+        self.progress(self.fraction, self.text)
+
+
+def is_known(runner: StageRunner) -> bool:
+    """Tell whether the folder holds a diagnosis of these very inputs, so that `diagnose` need not search.
+
+    Parameters
+    ----------
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
+
+    Returns
+    -------
+    bool
+        True if it does.
+    """
+    return runner.holds("diagnose", _rests_on(runner, *_limits(runner, is_asked=False)))
+
+
+def _limits(runner: StageRunner, *, is_asked: bool) -> tuple[_Run, float | None]:
+    """Give where a search is made, and in which time; a run takes over what the verb has found in any time."""
+    options = runner.inputs.options.diagnose
+    if is_asked or runner.holds("diagnose", _rests_on(runner, "always", options.seconds)):
+        return "always", options.seconds
+    seconds = RUN_SECONDS if options.seconds is None else options.seconds
+    return ("auto" if options.run == "auto" else "always"), seconds
+
+
+def _rests_on(runner: StageRunner, run: _Run, seconds: float | None) -> dict[str, object]:
+    """Give the key: what a limit of time has cut is another result; whether it is applied is no matter."""
+    inputs = runner.inputs
+    return {
+        "options": asdict(replace(inputs.options.diagnose, apply=False, run=run, seconds=seconds)),
+        "effects": [repr(type(effect)) for effect in inputs.effects],
+        "model": inputs.model_key,
+        "after": runner.after("ingest"),
+        "fit": [inputs.options.fit.band_hz, inputs.options.fit.exclude_hz],
+    }
 
 
 def levels(runner: StageRunner, fit: ModalFit, frfs: FrfSet) -> LevelDependence:
@@ -153,7 +197,8 @@ def effects_of(runner: StageRunner) -> dict[str, Effect]:
         By name.
     """
     options = runner.inputs.options.diagnose
-    return EffectCatalogue(options=options, folder=runner.inputs.folder, own=runner.inputs.effects).effects()
+    with entering(runner.inputs.ledger):
+        return EffectCatalogue(options=options, folder=runner.inputs.folder, own=runner.inputs.effects).effects()
 
 
 def corrections(diagnosis: Diagnosis | None) -> str:

@@ -188,7 +188,9 @@ def report(runner: StageRunner) -> None:
     runner : StageRunner
         Inputs, folder and keys of the earlier stages.
     """
-    key = runner.make_key("report", {"after": sorted(runner.keys.values())})
+    key = runner.make_key(
+        "report", {"after": sorted(runner.keys.values()), "test": dict(runner.inputs.test.particulars)}
+    )
     progress = runner.stage_progress("report")
     runner.store.page(
         "report", key, {"report.html": lambda path: write_report(Results(runner.store), path, progress=progress)}

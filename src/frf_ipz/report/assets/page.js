@@ -17,9 +17,10 @@
   };
   const NO_CLOUD = { displaylogo: false, showSendToCloud: false, plotlyServerURL: "" }; // measurements stay on this machine
   const PRINT_WIDTH = 680;
+  const PX_A_TICK = 80, DECADES_A_TICK = 0.31; // plotly: labels 1, 2 and 5 of each decade for more than 0.3 decades a tick
   const MOST_ROWS_TO_OPEN = 40; // longer tables under pictures are for the screen: on paper they would fill pages
   const decoded = [];
-  const drawn = new Map();
+  const drawn = new Map(); // pictures and places by the name of the place, which may hold one of several pictures
   let theme = "light";
   let hidden = new Set(page.hiddenFrfs);
   let range = null;
@@ -67,10 +68,22 @@
     }
     if ("frequency" in element.dataset) {
       const shown = range || layout.xaxis.range;
-      full.xaxis = { ...full.xaxis, type: scale, range: scale === "log" ? shown.map(logarithm) : [...shown] };
+      const labels = scale === "log" ? ".10~g" : ""; // 20, 50, 100, 200: else plotly writes 2, 5, 100, 2
+      full.xaxis = { ...full.xaxis, type: scale, tickformat: labels, nticks: mostTicks(shown, element), range: scale === "log" ? shown.map(logarithm) : [...shown] };
     }
     return full;
   }
+
+  // As many ticks as make 20, 50, 100, 200 of a logarithmic axis: with more, plotly labels 30, 40, 60 to 90 too.
+  function mostTicks(ends, figure) {
+    const decades = Math.log10(ends[1] / Math.max(ends[0], page.lowestHz));
+    if (scale !== "log" || decades < 1) return 0; // its own choice
+    const room = (printing ? PRINT_WIDTH : figure.querySelector(".plot").clientWidth) / PX_A_TICK;
+    return Math.max(Math.floor(Math.min(decades / DECADES_A_TICK, room)), 1);
+  }
+
+  const choiceIn = (figure) => figure.querySelector("select");
+  const pictureIn = (figure) => page.pictures[choiceIn(figure)?.value ?? figure.id];
 
   const logarithm = (value) => Math.log10(Math.max(value, page.lowestHz));
 
@@ -84,8 +97,8 @@
   }
 
   function draw(name) {
-    const picture = page.pictures[name];
     const figure = document.getElementById(name);
+    const picture = pictureIn(figure);
     const plot = figure.querySelector(".plot");
     const config = { responsive: !printing, ...NO_CLOUD, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] };
     Plotly.react(plot, traces(picture, drawn.has(name) && plot.data), themed(unpack(picture.layout), figure), config);
@@ -94,8 +107,16 @@
       plot.on("plotly_relayout", (change) => follow(name, change));
       plot.on("plotly_afterplot", () => openLegend(plot));
       plot.addEventListener("keydown", (event) => steer(event, name));
+      choiceIn(figure)?.addEventListener("change", () => choosePicture(figure));
       openLegend(plot);
     }
+  }
+
+  function choosePicture(figure) {
+    const { title, alt } = choiceIn(figure).selectedOptions[0].dataset;
+    figure.querySelector("figcaption").textContent = title;
+    figure.querySelector(".plot").setAttribute("aria-label", alt);
+    draw(figure.id);
   }
 
   // Names are escaped for plotly, which takes some tags in them for markup.
@@ -136,18 +157,19 @@
     if (change["xaxis.autorange"]) show(null);
     else if (change["xaxis.range[0]"] !== undefined) {
       const ends = [change["xaxis.range[0]"], change["xaxis.range[1]"]];
-      show(scale === "log" ? ends.map((end) => 10 ** end) : ends, name);
+      show(scale === "log" ? ends.map((end) => 10 ** end) : ends);
     }
   }
 
-  function show(ends, except) {
+  function show(ends) {
     range = ends;
     for (const [name, plot] of drawn) {
       const figure = document.getElementById(name);
-      if (name === except || !("frequency" in figure.dataset)) continue;
-      const shown = range || page.pictures[name].layout.xaxis.range;
+      if (!("frequency" in figure.dataset)) continue;
+      const shown = range || pictureIn(figure).layout.xaxis.range;
       plot.layout.xaxis.range = scale === "log" ? shown.map(logarithm) : [...shown];
       plot.layout.xaxis.autorange = false;
+      plot.layout.xaxis.nticks = mostTicks(shown, figure);
       Plotly.redraw(plot);
     }
   }
@@ -158,7 +180,7 @@
     const plot = drawn.get(name);
     if (event.key === "0") {
       if ("frequency" in figure.dataset) show(null);
-      else Plotly.react(plot, plot.data, themed(unpack(page.pictures[name].layout), figure));
+      else Plotly.react(plot, plot.data, themed(unpack(pictureIn(figure).layout), figure));
     } else if (event.key in moves && plot.layout.xaxis) {
       const [low, high] = plot.layout.xaxis.range;
       const [left, right] = moves[event.key].map((part) => part * (high - low));
@@ -214,7 +236,7 @@
       list.dataset.was = list.open;
       list.open = list.open || list.querySelectorAll("tr").length <= MOST_ROWS_TO_OPEN;
     });
-    Object.keys(page.pictures).forEach(draw);
+    places().forEach(draw);
   }
 
   function afterPrint() {
@@ -223,11 +245,23 @@
     setTheme(screenTheme);
   }
 
+  const places = () => [...document.querySelectorAll("figure[id]")].filter(pictureIn).map((figure) => figure.id);
+
+  // A page that is sent on carries the library packed; the policy of the page lets no other script run.
+  async function unpackLibrary() {
+    const packed = document.getElementById("library");
+    const bytes = Uint8Array.from(atob(packed.textContent), (c) => c.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const script = document.createElement("script");
+    script.textContent = await new Response(stream).text();
+    document.head.append(script);
+  }
+
   function start() {
     setTheme(window.matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
     setScale(scale);
     listen();
-    const waiting = new Set(Object.keys(page.pictures));
+    const waiting = new Set(places());
     const take = (name) => { if (waiting.delete(name)) draw(name); };
     const observer = new IntersectionObserver((entries) => {
       entries.filter((entry) => entry.isIntersecting).forEach((entry) => take(entry.target.id));
@@ -243,5 +277,8 @@
     whenIdle(next);
   }
 
-  start();
+  if (window.Plotly) start();
+  else unpackLibrary().then(start, () => {
+    document.querySelectorAll(".plot").forEach((plot) => { plot.textContent = "This browser is too old to draw here: one of 2023 or later does."; });
+  });
 })();

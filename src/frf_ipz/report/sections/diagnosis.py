@@ -55,6 +55,8 @@ def build(run: Results) -> Section | None:
         *_detectability(diagnosis),
     )
     lead = typeset(diagnosis.statement) or verdict_of(diagnosis)[0]
+    if "diagnose" in run.stale:
+        lead = f"Not looked for since the last change. Before it: {lead}"
     notes = (
         *mismatch_sentence(diagnosis),
         *[ambiguity.statement for ambiguity in diagnosis.ambiguity],
@@ -79,7 +81,7 @@ def _finding_table(diagnosis: Diagnosis) -> Table:
             ]
             for finding in entries
         ]
-    columns = ("effect", "", "where", "parameters", "probability", "log Bayes factor", "in words")
+    columns = ("effect", "rank", "where", "parameters", "probability", "log Bayes factor", "in words")
     caption = "Findings and alternatives" if diagnosis.findings else "What was tried and is not needed"
     return Table(caption=caption, columns=columns, rows=rows, file="diagnosis.json")
 
@@ -119,7 +121,7 @@ def _check_table(diagnosis: Diagnosis) -> Table:
         for check in diagnosis.data_checks
     ]
     return Table(
-        caption="Checks", columns=("check", "value", "limit", "", "in words"), rows=rows, file="diagnosis.json"
+        caption="Checks", columns=("check", "value", "limit", "result", "in words"), rows=rows, file="diagnosis.json"
     )
 
 

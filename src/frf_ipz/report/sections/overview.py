@@ -1,4 +1,4 @@
-"""The first screen: the verdict, three numbers, the structure."""
+"""The first screen: the verdict, the FRF at the point of interest, three numbers, the checks, the structure."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from frf_ipz.assessment.assessment import Verdict
 from frf_ipz.assessment.deviations import POINTS
 from frf_ipz.plotting.wording import counted, listed, number, percent, small_percent
 from frf_ipz.report.findings import card_texts, verdict_of
-from frf_ipz.report.section import Card, Headline, Section, Table, run_figures
+from frf_ipz.report.section import Card, Cards, Headline, Section, Table, run_figures
 from frf_ipz.runs.figures import coherence_text, deviation_of
 from frf_ipz.runs.picture_data import update_targets
 
@@ -26,6 +26,7 @@ VERDICTS = {
     Verdict.WITH_CARE: "To be used with care",
     Verdict.NOT_USABLE: "Not usable",
 }
+BESIDE = frozenset({"causes"})  # only where a diagnosis finds any: an old one may be left over
 NO_ERROR = 1e-5  # a smaller error of a frequency interests nobody
 
 
@@ -43,15 +44,20 @@ def build(run: Results) -> Section:
         The section.
     """
     sentence, addition = verdict(run)
-    headline = Headline(sentence=sentence, addition=addition, cards=tuple(_cards(run)))
     notes: tuple[str, ...] = ()
-    if run.stale:
-        notes = (f"Made before the last change, and not yet run again: {listed(sorted(run.stale), 10)}.",)
+    if run.stale - BESIDE:
+        notes = (f"Made before the last change, and not yet run again: {listed(sorted(run.stale - BESIDE), 10)}.",)
     return Section(
         anchor="overview",
         title="Overview",
         lead="",
-        blocks=(headline, *_checks(run), *run_figures(run, "structure")),
+        blocks=(
+            Headline(sentence=sentence, addition=addition),
+            *run_figures(run, "prediction")[:1],
+            Cards(tuple(_cards(run))),
+            *_checks(run),
+            *run_figures(run, "structure"),
+        ),
         notes=notes,
     )
 
@@ -70,7 +76,7 @@ def verdict(run: Results) -> tuple[str, str]:
         The verdict in a sentence, and what there is to add.
     """
     parts = [] if run.assessment is None else [assessment_sentence(run.assessment)]
-    parts += list(verdict_of(run.diagnosis)) if run.diagnosis is not None else []
+    parts += list(verdict_of(run.diagnosis)) if run.diagnosis is not None and "diagnose" not in run.stale else []
     if run.updated_model is not None and run.pairs is not None:
         parts.append(_of_update(run))
     elif run.fit is not None:
@@ -150,7 +156,9 @@ def _of_update(run: Results) -> str:
     if prediction is not None and np.isfinite(prediction.half_width_db).any():
         worst = int(np.nanargmax(prediction.half_width_db))
         width = number(float(prediction.half_width_db[worst]), 2)
-        text += f", and predicts {prediction.labels[worst]} to ±{width} dB (90 % band, {prediction.band_text}, median)"
+        shape = "the shape of " if worst in prediction.relative else ""
+        text += f", and predicts {shape}{prediction.labels[worst]} to ±{width} dB"
+        text += f" (90 % band, {prediction.band_text}, median)"
         others = len(prediction.labels) - 1
         text += f" and {counted(others, 'other FRF')} to less" if others else ""
     return text + "."
@@ -210,6 +218,8 @@ def _target_card(run: Results) -> Card:
 
 
 def _missing_card(run: Results) -> Card:
+    if "diagnose" in run.stale:
+        return Card("Missing in the model", "not looked for", "since the last change")
     if run.diagnosis is not None:
         figure, meaning = card_texts(run.diagnosis)
         return Card("Missing in the model", figure, meaning)

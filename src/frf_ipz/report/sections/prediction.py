@@ -39,11 +39,13 @@ def build(run: Results) -> Section | None:
     lead = f"{counted(len(prediction.labels), 'FRF')} predicted at {points}, in the quantity that was measured."
     if not known:
         lead += " Nothing was measured there."
+    lead += f" {'The first' if len(prediction.labels) > 1 else 'It'} is drawn on the first screen."
+    with_causes = run.with_causes if _counts(run) else None
     return Section(
         anchor="prediction",
         title="Points of interest",
         lead=lead,
-        blocks=(*run_figures(run, "prediction"), _table(prediction, known, run.with_causes if _counts(run) else None)),
+        blocks=(*run_figures(run, "prediction")[1:], _table(prediction, known, with_causes)),
         notes=prediction.warnings,
     )
 

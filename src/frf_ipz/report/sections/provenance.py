@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+import re
+from collections.abc import Mapping
+from posixpath import basename, commonpath, dirname, normpath, relpath
+from typing import TYPE_CHECKING, Any
 
 from frf_ipz.plotting.wording import number
 from frf_ipz.report.section import Listing, Section, Table
@@ -11,6 +14,7 @@ from frf_ipz.report.section import Listing, Section, Table
 if TYPE_CHECKING:
     from frf_ipz.runs.results import Results
 
+ABSOLUTE = re.compile(r"(?P<drive>[A-Za-z]:|)(?P<place>/.*)", re.DOTALL)
 SHOWN_DIGITS = 16  # of a digest; all stand in run.json
 
 
@@ -33,8 +37,10 @@ def build(run: Results) -> Section:
         "Python": manifest.get("python", ""),
         **manifest.get("packages", {}),
     }
-    lead = f"Pipeline {manifest.get('pipeline', '')}" + (f", run on {manifest['when']}." if "when" in manifest else ".")
-    options = json.dumps(manifest.get("configuration", {}), indent=1, ensure_ascii=False)
+    pipeline = str(manifest.get("pipeline", ""))
+    name = basename(pipeline.replace("\\", "/"))
+    lead = f"Pipeline {name}" + (f", run on {manifest['when']}." if "when" in manifest else ".")
+    options = json.dumps(_shown(manifest.get("configuration", {}), pipeline), indent=1, ensure_ascii=False)
     blocks = (
         Table(
             caption="Versions",
@@ -45,14 +51,59 @@ def build(run: Results) -> Section:
             caption="Stages", columns=("stage", "time, s", "state", "digest of all it depends on"), rows=_stages(run)
         ),
         Table(
-            caption="Input files",
+            caption="Input files, as seen from the pipeline's folder",
             columns=("file", "SHA-256"),
-            rows=[[name, digest[:SHOWN_DIGITS] + "…"] for name, digest in manifest.get("inputs", {}).items()],
+            rows=[
+                [path_from(name, pipeline), digest[:SHOWN_DIGITS] + "…"]
+                for name, digest in manifest.get("inputs", {}).items()
+            ],
             file="run.json",
         ),
         Listing(title="All options, as resolved", text=options),
     )
     return Section(anchor="provenance", title="Provenance", lead=lead, blocks=blocks)
+
+
+def _shown(value: object, pipeline: str) -> Any:  # noqa: ANN401  a tree of plain values
+    """Take the folders above the campaign, which only the computer of the run has, out of options."""
+    if isinstance(value, Mapping):
+        return {key: _shown(item, pipeline) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_shown(item, pipeline) for item in value]
+    return path_from(value, pipeline) if isinstance(value, str) else value
+
+
+def path_from(path: str, pipeline: str) -> str:
+    """Write an absolute path as it is seen from the folder of a pipeline.
+
+    Parameters
+    ----------
+    path : str
+        Of a file, with the separators of any system; what is no absolute path stays as it is.
+    pipeline : str
+        Path of the pipeline file.
+
+    Returns
+    -------
+    str
+        The name alone where the two have no folder in common.
+
+    Examples
+    --------
+    >>> path_from("/home/me/beam/data/../test.toml", "/home/me/beam/runs/pipeline.toml")
+    '../test.toml'
+    >>> path_from("/mnt/test.toml", "/home/me/pipeline.toml")
+    'test.toml'
+    """
+    given = ABSOLUTE.fullmatch(path.replace("\\", "/"))
+    if given is None:
+        return path
+    place = normpath(given["place"])
+    start = ABSOLUTE.fullmatch(pipeline.replace("\\", "/"))
+    if start is None or start["drive"].lower() != given["drive"].lower():
+        return basename(place)
+    folder = dirname(normpath(start["place"]))
+    return basename(place) if commonpath([place, folder]) == "/" else relpath(place, folder)
 
 
 def _stages(run: Results) -> list[list[str]]:

@@ -336,9 +336,9 @@
   function click(event) {
     const button = event.target.closest("button");
     if (!button) return;
-    const { change: wish, run, drag, fill, mode, allow } = button.dataset;
+    const { change: wish, command, drag, fill, mode, allow } = button.dataset;
     if (wish) change(JSON.parse(wish));
-    else if (run) change({}, "run");
+    else if (command) change({}, command);
     else if (allow) change({ digest: allow }, "allow");
     else if (drag) setDrag(drag);
     else if (fill) fillPole(fill);
@@ -350,8 +350,20 @@
     else if (button.id === "read") complain("");
   }
 
+  // Ctrl-Z and Ctrl-Y mean the pipeline, but in a field the text of that field.
+  function undoByKey(event) {
+    if (!(event.ctrlKey || event.metaKey) || event.target.closest("input, select, textarea")) return;
+    const key = event.key.toLowerCase();
+    const command = key === "y" || (key === "z" && event.shiftKey) ? "redo" : key === "z" ? "undo" : "";
+    const button = command && find(`[data-command=${command}]`);
+    if (!button || button.disabled) return;
+    event.preventDefault();
+    change({}, command);
+  }
+
   function start() {
     document.addEventListener("submit", submit);
+    document.addEventListener("keydown", undoByKey);
     document.addEventListener("click", click);
     document.addEventListener("change", (event) => {
       const { record } = event.target.dataset;

@@ -219,8 +219,10 @@ class PublishedStep:
         self.evaluate((self.damping if self.settings.damping else self.stiffness).take(self.back))
         poles, size, count = self.n_poles, self.order - 1, self.targets.shape[1]
         whole = _decomposition(self.changed.take(self.back), self.unit[0])
-        part = _decomposition(self.changed[:size, :size], self.unit[1])
         for_poles = self._most_sensitive(whole, slice(0, poles), self.rows, self.columns)
+        if poles == count:  # a single mass has no zero and no substructure
+            return for_poles, np.zeros(0, np.int64)
+        part = _decomposition(self.changed[:size, :size], self.unit[1])
         for_zeros = self._most_sensitive(part, slice(poles, count), np.arange(size), np.arange(size))
         return for_poles, for_zeros
 

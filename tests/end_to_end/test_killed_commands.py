@@ -1,0 +1,136 @@
+"""A command that is killed at any moment leaves the old results or the new ones, whole, and the next one is as ever."""
+
+import random
+import shutil
+import signal
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+import commands
+from looking import look
+from small_campaign import write_campaign
+from whole_results import content, faults_after_a_command, faults_of_reading, results_of
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are copied, and killed by a signal")
+
+VERBS = ("run", "diagnose", "export", "first run")
+QUICK_SEARCH = '[diagnose]\neffects = ["global_stiffness"]\n'
+N_MOMENTS = 4  # of the changes of each verb, in the fast tests
+N_RANDOM = 100
+OTHER_BAND = "580.0"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A folder of results, what a command makes of it, and how many changes it needs for that."""
+
+    folder: Path
+    verb: str
+    n_changes: int
+    old: object
+    new: object
+    clean: object
+
+    def copy(self, place):
+        """The folder as it was before the command."""
+        shutil.rmtree(place, ignore_errors=True)
+        if (self.folder / "old").exists():
+            shutil.copytree(self.folder / "old", place)
+        return place
+
+    def start(self, out, **options):
+        """The command on a copy."""
+        verb, pipeline = self.verb.split()[-1], self.folder / "pipeline.toml"
+        return commands.Command(verb, pipeline, "--out", out, log=self.folder / "log", within=out, **options)
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory):
+    """A case of each verb, made when it is first asked for."""
+    made = {}
+
+    def case(verb):
+        if verb not in made:
+            made[verb] = _make_case(tmp_path_factory.mktemp("killed"), verb)
+        return made[verb]
+
+    return case
+
+
+def _make_case(folder, verb):
+    pipeline = write_campaign(folder)
+    pipeline.write_text(pipeline.read_text().replace("[diagnose]\n", QUICK_SEARCH))
+    log = folder / "log"
+    if verb != "first run":
+        assert commands.run("run", pipeline, "--out", folder / "old", log=log)[0] == 0
+        (folder / "old" / "own.txt").write_text("the user's")
+    pipeline.write_text(pipeline.read_text().replace("600.0", OTHER_BAND))
+    case = Case(folder=folder, verb=verb, n_changes=0, old=results_of(folder / "old"), new=None, clean=None)
+    command = case.start(case.copy(folder / "new"))
+    assert command.wait() == 0, command.said
+    n_changes, new = command.counter.value, results_of(folder / "new")
+    assert commands.run("run", pipeline, "--out", folder / "clean", log=log)[0] == 0
+    return Case(
+        folder=folder, verb=verb, n_changes=n_changes, old=case.old, new=new, clean=results_of(folder / "clean")
+    )
+
+
+def judge(case, out):
+    """The old or the new, whole, to whoever reads; and as a clean run after the next one."""
+    assert faults_of_reading(out) == []
+    found = results_of(out)
+    assert found in (case.old, case.new)
+    if found is not None:
+        assert look(out, case.folder, ("plot", "show ")) == ([], {})
+    status, said, _ = commands.run("run", case.folder / "pipeline.toml", "--out", out, log=case.folder / "log")
+    assert status == 0, said
+    assert faults_after_a_command(out) == []
+    results = results_of(out)
+    assert {name: results[name] for name in case.clean} == case.clean
+    if case.old is not None:
+        assert content(out)["own.txt"] == b"the user's"
+    return found
+
+
+def kill_before(case, number):
+    out = case.copy(case.folder / "killed")
+    command = case.start(out, killed_before=number)
+    assert command.wait() == -signal.SIGKILL
+    return judge(case, out)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_killed_before_some_changes_it_is_the_old_or_the_new_whole(cases, verb):
+    case = cases(verb)
+    assert case.n_changes > N_MOMENTS
+    moments = sorted({round(place * (case.n_changes - 1) / (N_MOMENTS - 1)) for place in range(N_MOMENTS)})
+    found = [kill_before(case, number) for number in moments]
+    assert found[0] == case.old != case.new == found[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("verb", VERBS)
+def test_killed_before_any_change_it_is_the_old_or_the_new_whole(cases, verb):
+    case = cases(verb)
+    found = [kill_before(case, number) for number in range(case.n_changes)]
+    first = found.index(case.new)
+    assert 0 < first < case.n_changes - 1
+    assert found == [case.old] * first + [case.new] * (case.n_changes - first)
+
+
+@pytest.mark.slow
+def test_killed_at_random_it_is_the_old_or_the_new_whole(cases):
+    rng = random.Random(7)
+    for number in range(N_RANDOM):
+        case = cases(VERBS[number % len(VERBS)])
+        out = case.copy(case.folder / "killed")
+        command = case.start(out)
+        command.wait_for(rng.randrange(case.n_changes))  # then at a moment of its own: none that a change begins at
+        time.sleep(rng.uniform(0, 2e-3))
+        command.signal(signal.SIGKILL)
+        command.wait()
+        judge(case, out)

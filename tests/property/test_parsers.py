@@ -1,0 +1,167 @@
+"""Whatever lies in a file, a parser reads it or refuses it with an error of the project.
+
+A profile with more examples looks longer: ``HYPOTHESIS_PROFILE=long pytest tests/property/test_parsers.py``.
+"""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import frf_ipz
+from fe_models import BEAM_TEXT, LUMPED_TEXT
+from frf_ipz.errors import FrfIpzError
+from frf_ipz.fe.matrices.dof_table import read_dof_table
+from frf_ipz.fe.matrices.matrix_market import read_matrix_market
+from frf_ipz.fe.model_file import read_model
+from frf_ipz.ingest.campaign_file import read_test
+from frf_ipz.ingest.formats.registry import open_recording
+from frf_ipz.json_files import read_json
+from frf_ipz.pipeline.config import read_pipeline
+from frf_ipz.runs.manifest import load_manifest
+from frf_ipz.runs.stage_file import StageFile, read_stage_file, write_stage_file
+from mutated_inputs import TOKENS
+from small_campaign import PIPELINE, TEST
+
+ROWS = "".join(f"{row / 1024!r},{10.0 * (row == 3)!r},{1.0 / (1 + row)!r}\n" for row in range(24))
+STAMPED = "".join(f"27/03/2025 10:51:13,{row:03d};{row};{row % 5},5\n" for row in range(24))
+FRF_ROWS = "".join(f"{hz}.0,5:+z,3:+z,{1.0 / hz!r},{-0.5 / hz!r}\n" for hz in range(1, 20))
+TRIPLES = "3 3 5\n1 1 2.0\n2 2 2.0\n3 3 2.0\n2 1 -1.0\n3 2 -1.0\n"
+DOFS = "node,direction,x_m,y_m,z_m\n1,z,0.0,0,0\n2,z,0.5,0,0\n3,z,1.0,0,0\n"
+
+
+def universal(kind):
+    head = [f"{kind:5d}         0    0         0       NONE         5   3       NONE         3   3"]
+    head += [f"         5{18:10d}         1{5.0:13.5e}{1.0:13.5e}{0.0:13.5e}"]
+    head += [f"{number:10d}    0    0    0 {name:<20s} {unit:<20s}" for number, name, unit in AXES]
+    rows = ["".join(f"{value:13.5e}" for value in range(6))] * (6 if kind == 4 else 3)
+    type_of_ordinates = 5 if kind == 4 else 2
+    head[1] = head[1].replace("         5", f"{type_of_ordinates:10d}", 1)
+    return "\n".join(["    -1", "    58", *["NONE"] * 5, *head, *rows, "    -1", ""])
+
+
+AXES = ((18, "Frequency", "Hz"), (12, "force", "m/s2"), (13, "Force", "N"), (0, "NONE", "NONE"))
+
+
+def stage_file():
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.bin"
+        write_stage_file(StageFile(key="0f", tree={"a": [1, "x"]}, arrays=[np.arange(6.0).reshape(2, 3)]), path)
+        return path.read_bytes()
+
+
+def read_recording(path):
+    return [block.sum() for block in open_recording(path, ["force", "acc"]).blocks]
+
+
+def read_channel(path):
+    return [block.sum() for block in open_recording(path, ["force"]).blocks]
+
+
+def read_columns(path):
+    columns = ("frequency_hz", "real", "imag")
+    return frf_ipz.read_frfs(path, output="1:+z", input="2:+z", columns=columns, skip_rows=1)
+
+
+PARSERS = {
+    "recording.csv": (f"time,force,acc\ns,N,m/s^2\n{ROWS}", read_recording),
+    "stamped.csv": (f"sep=;\nDate;force;acc\n{STAMPED}", read_recording),
+    "recording.uff": (universal(1), read_channel),
+    "frf.csv": (f"frequency_hz,output_dof,input_dof,real,imag\n{FRF_ROWS}", frf_ipz.read_frfs),
+    "frf.txt": ("an analyser\n" + FRF_ROWS.replace(",5:+z,3:+z,", "\t").replace(",", "\t"), read_columns),
+    "frf.uff": (universal(4), frf_ipz.read_frfs),
+    "general.mtx": (
+        f"%%MatrixMarket matrix coordinate real symmetric\n% K\n{TRIPLES}",
+        lambda path: read_matrix_market(path, 3, "dofs.csv"),
+    ),
+    "array.mtx": (
+        "%%MatrixMarket matrix array real general\n3 3\n" + "2.0\n-1.0\n0.0\n" * 3,
+        lambda path: read_matrix_market(path, 3, "dofs.csv"),
+    ),
+    "dofs.csv": (DOFS, read_dof_table),
+    "test.toml": (TEST, read_test),
+    "beam.toml": (BEAM_TEXT, read_model),
+    "lumped.toml": (LUMPED_TEXT, read_model),
+    "pipeline.toml": (PIPELINE, read_pipeline),
+    "values.json": ('{"a": [1.5, null, "x"], "b": {"c": true}}', read_json),
+    "run.json": ('{"frf_ipz_version": "0.3.0", "name": "x", "stages": {"fit": {"files": ["poles.parquet"]}}}', None),
+    "stage.bin": (None, read_stage_file),
+}
+
+
+def parse(name, data):
+    """Read a file with these bytes, alone in its folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        path.write_bytes(data)
+        reader = PARSERS[name][1]
+        return load_manifest(Path(folder)) if reader is None else reader(path)
+
+
+def refusal_of(name, data):
+    """Give what is said about a file that is refused."""
+    try:
+        parse(name, data)
+    except FrfIpzError as error:
+        return str(error)
+    return None
+
+
+edits = st.lists(
+    st.tuples(
+        st.floats(0.0, 1.0),  # where in the file
+        st.integers(0, 30),  # how many bytes go
+        st.one_of(
+            st.sampled_from([token.encode() for token in TOKENS]),
+            st.binary(max_size=8),
+            st.text("0123456789.+-eEdD,; \t\n", max_size=12).map(str.encode),
+        ),
+    ),
+    min_size=1,
+    max_size=6,
+)
+
+
+def edited(data, changes):
+    for share, length, new in changes:
+        place = int(share * len(data))
+        data = data[:place] + new + data[place + length :]
+    return data
+
+
+@pytest.mark.parametrize("name", PARSERS)
+def test_what_is_valid_is_read(name):
+    text = PARSERS[name][0]
+    if name == "test.toml":
+        with pytest.raises(FrfIpzError, match="no file fits"):  # its recordings are not there
+            parse(name, text.encode())
+    else:
+        parse(name, stage_file() if text is None else text.encode())
+
+
+@pytest.mark.parametrize("name", PARSERS)
+@given(data=st.data())
+def test_anything_is_read_or_refused(name, data):
+    text = PARSERS[name][0]
+    valid = stage_file() if text is None else text.encode()
+    content = data.draw(st.one_of(edits.map(lambda changes: edited(valid, changes)), st.binary(max_size=200)))
+    refusal = refusal_of(name, content)
+    assert refusal is None or name in refusal  # the file is named
+    assert "\n" not in (refusal or "")
+
+
+FOUND = [  # by a longer search
+    ("recording.uff", (0.26953125, 0, b"\n")),
+    ("frf.csv", (0.0, 0, b"0;")),
+    ("frf.csv", (0.5700660287258991, 14, b"1e300")),
+]
+
+
+@pytest.mark.parametrize(("name", "change"), FOUND)
+def test_what_a_longer_search_has_found_is_refused(name, change):
+    refusal = refusal_of(name, edited(PARSERS[name][0].encode(), [change]))
+    assert refusal is not None
+    assert name in refusal
