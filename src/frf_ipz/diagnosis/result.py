@@ -642,7 +642,8 @@ class Diagnosis(Tabulated, Drawn):
     @property
     def is_explained(self) -> bool:
         """True where nothing remains that the findings and the measured damping do not explain."""
-        return not (self.verdict == "unexplained" and self.unexplained_part)
+        is_damping_only = bool(self.statements) and not self.unexplained_part
+        return self.verdict != "unexplained" or is_damping_only
 
     def __repr__(self) -> str:
         effects = ", ".join(finding.effect for finding in self.findings) or "no finding"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.result import as_appearance
+from frf_ipz.report.section import Cards
 from frf_ipz.report.sections import frfs as frf_section
 from frf_ipz.report.sections import overview, pairing
 from frf_ipz.runs.figures import coherence_text, deviation_of
@@ -20,7 +21,8 @@ def run():
 
 
 def cards(run):
-    return {card.title: card for card in overview.build(run).blocks[0].cards}
+    (block,) = [block for block in overview.build(run).blocks if isinstance(block, Cards)]
+    return {card.title: card for card in block.cards}
 
 
 def test_the_error_is_that_of_the_page(run):
@@ -53,7 +55,7 @@ def test_the_coherence_is_that_of_the_band_and_of_the_page(run):
     assert f"coherence {text}" in drowned.summary()
     without_model = with_results(drowned, updated_model=None, diagnosis=None)
     assert cards(without_model)["Coherence"].figure == "0.9877"
-    (table,) = [block.table for block in frf_section.build(drowned).blocks if block.table is not None]
+    (table,) = [block.table for block in frf_section.build(drowned).blocks if getattr(block, "table", None)]
     assert {row[5] for row in table.rows} == {"0.9877"}
 
 
