@@ -13,9 +13,12 @@ import time
 from pathlib import Path
 
 from frf_ipz.cli.main import main
+from frf_ipz.cli.printing import say_error
+from frf_ipz.errors import FrfIpzError
 from frf_ipz.runs import folder_lock
 
 CHANGES = {"os.rename", "os.link", "os.remove", "os.mkdir", "os.rmdir", "os.symlink", "os.truncate"}
+NEED_ROOM = {"open", "os.link", "os.mkdir", "os.symlink"}
 LOADED = (
     "frf_ipz.cli.commands",
     "frf_ipz.cli.terminal",
@@ -30,17 +33,15 @@ LONGEST_S = 120.0  # a command takes seconds
 class Command:
     """A command that is at work in a process of its own.
 
-    `killed_before` kills it before the change of that number, `refused` lets the system refuse some: pairs of a number
-    and an ``errno``; a number is counted among the changes below `within`. Other `work` than the command line
-    is a function.
+    `killed_before` kills it before the change of that number; `refused` is an ``errno`` by which the system refuses the
+    change `refused_at`, or all that need room on the disk from `refused_from` on. Numbers are counted among the changes
+    below `within`. No file gets larger than `most_bytes`. Other `work` than the command line is a function.
     """
 
-    def __init__(self, *arguments, log, work=None, within=None, killed_before=None, refused=(), most_bytes=None):
+    def __init__(self, *arguments, log, work=None, within=None, most_bytes=None, **faults):
         self.log, self.counter = Path(log), _context().Value("i", 0)
         options = {
-            "within": None if within is None else os.fspath(Path(within).resolve()),
-            "killed_before": killed_before,
-            "refused": dict(refused),
+            "faults": {"within": None if within is None else os.fspath(Path(within).resolve()), **faults},
             "most_bytes": most_bytes,
             "work": work or command_line,
         }
@@ -106,8 +107,12 @@ def _work(arguments, log, counter, options):
         import resource
 
         resource.setrlimit(resource.RLIMIT_FSIZE, (options["most_bytes"],) * 2)
-    _watch(counter, **{name: options[name] for name in ("within", "killed_before", "refused")})
-    options["work"](*arguments)
+    _watch(counter, **options["faults"])
+    try:
+        options["work"](*arguments)
+    except FrfIpzError as error:  # as the command line does
+        say_error(str(error))
+        sys.exit(2)
 
 
 def command_line(*arguments):
@@ -122,15 +127,16 @@ def impatient(*arguments):
     command_line(*arguments)
 
 
-def _watch(counter, *, within, killed_before, refused):
+def _watch(counter, *, within, killed_before=None, refused=None, refused_at=None, refused_from=None):
     def note(event, arguments):
         if not _changes(event, arguments, within):
             return
         number, counter.value = counter.value, counter.value + 1
         if number == killed_before:
             os.kill(os.getpid(), signal.SIGKILL)
-        if number in refused:
-            raise OSError(refused[number], os.strerror(refused[number]), str(arguments[0]))
+        is_full = refused_from is not None and number >= refused_from and event in NEED_ROOM
+        if number == refused_at or is_full:
+            raise OSError(refused, os.strerror(refused), str(arguments[0]))
 
     sys.addaudithook(note)
 

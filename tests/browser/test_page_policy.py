@@ -11,10 +11,10 @@ import pytest
 from frf_ipz.report.page import write_report
 from frf_ipz.runs.results import Results
 from hostile_run import hostile_folder
+from opened_page import open_page
 
 pytestmark = pytest.mark.browser
 
-PATIENCE_S = 60.0  # on a machine that does much else
 UPLOADS = ("cloud", "share", "studio")
 FOREIGN = """
 <script>window.hacked = 1</script><img src="ADDRESS/image"><svg onload="window.hacked = 1"></svg>
@@ -59,14 +59,6 @@ def listening():
     yield f"http://127.0.0.1:{server.server_port}", asked
     server.shutdown()
     server.server_close()
-
-
-def open_page(browser, path):
-    browser.get(path.as_uri())
-    until = time.monotonic() + PATIENCE_S
-    while not browser.execute_script("return document.documentElement.dataset.drawn === 'all'"):
-        assert time.monotonic() < until, "the pictures were never drawn"
-        time.sleep(0.05)
 
 
 def requests(browser):

@@ -1,7 +1,6 @@
 """The page in a real browser: every picture draws, nothing is an error, hover, keys, linked axes, themes, print."""
 
 import base64
-import time
 
 import numpy as np
 import pytest
@@ -9,34 +8,17 @@ import pytest
 from frf_ipz.report.page import write_report
 from frf_ipz.runs.results import Results
 from hostile_run import HOSTILE, hostile_folder
+from opened_page import errors, open_page, wait_for
 from synthetic_run import Folder, many_frfs, synthetic_folder
 
 pytestmark = pytest.mark.browser
 
-PATIENCE_S = 60.0  # on a machine that does much else
 ARROW_RIGHT, TAB, ENTER, SPACE = "\ue014", "\ue004", "\ue007", " "  # as WebDriver writes them
 LONG = f"<details><table>{'<tr><td>1</td></tr>' * 50}</table></details>"
 ROWS_AND_STATE = (
     "return [...document.querySelectorAll('main details')].map((d) => [d.querySelectorAll('tr').length, d.open])"
 )
 DRAWN = ".main-svg .trace, .main-svg .bars, .main-svg .hm"
-
-
-def open_page(browser, path):
-    browser.get(path.as_uri())
-    wait_for(browser, "return document.documentElement.dataset.drawn === 'all'")
-    return browser
-
-
-def wait_for(browser, script):
-    until = time.monotonic() + PATIENCE_S
-    while not browser.execute_script(script):
-        assert time.monotonic() < until, f"never came true: {script}"
-        time.sleep(0.05)
-
-
-def errors(browser):
-    return [entry["message"] for entry in browser.get_log("browser") if entry["level"] in {"SEVERE", "WARNING"}]
 
 
 @pytest.fixture(scope="module")

@@ -66,6 +66,10 @@ def test_all_files_of_the_contract_are_there(run):
     assert {*CONTRACT, "updated_model.npz", "statespace.json", "statespace.mat", "report.html", "run.json"} <= names
 
 
+def test_the_page_is_light_enough_to_be_sent_on(run):
+    assert (run.path / "report.html").stat().st_size <= 2_000_000
+
+
 def test_the_model_file_holds_matrices_and_dofs(run):
     with np.load(run.path / "updated_model.npz") as model:
         assert set(model.files) == {"M", "B", "K", "dofs"}

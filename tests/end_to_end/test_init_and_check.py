@@ -1,13 +1,15 @@
 """The first steps of a new user: files to start from, and a look at the set-up before anything is run."""
 
+import re
 import sys
 
+import numpy as np
 import pytest
 
 from frf_ipz.cli import main as command
 from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
-from frf_ipz.pipeline.check import describe_setup
+from frf_ipz.pipeline.check.setup import describe_setup
 from frf_ipz.pipeline.config import read_pipeline
 from frf_ipz.pipeline.init import write_starting_files
 from frf_ipz.pipeline.inputs import read_inputs
@@ -131,7 +133,7 @@ def test_init_invents_no_rate(campaign):
 
 
 def test_check_reads_large_recordings_to_the_first_block(campaign, monkeypatch):
-    monkeypatch.setattr("frf_ipz.pipeline.check.WHOLE_BYTES", 0)
+    monkeypatch.setattr("frf_ipz.pipeline.check.measurement.WHOLE_BYTES", 0)
     assert "  read      3 x more than " in describe_setup(read_inputs(campaign / "pipeline.toml"))
 
 
@@ -140,3 +142,138 @@ def test_check_counts_the_recordings_that_it_cannot_read(campaign):
         (campaign / "hits" / name).write_text("time,force,acc\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"blow_1\.csv.*2 of 3 recordings cannot be read"):
         describe_setup(read_inputs(campaign / "pipeline.toml"))
+
+
+FITS = "Everything fits together. Nothing was run."
+
+
+def look(campaign):
+    return describe_setup(read_inputs(campaign / "pipeline.toml"))
+
+
+def open_points(text):
+    return [line.removeprefix("  - ") for line in text.splitlines() if line.startswith("  - ")]
+
+
+def rewrite(path, *changes):
+    text = path.read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+
+
+def edit_recordings(campaign, change):
+    for path in (campaign / "hits").glob("*.csv"):
+        table = np.loadtxt(path, delimiter=",", skiprows=1)
+        np.savetxt(path, change(table), delimiter=",", header="time,force,acc", comments="", fmt="%.8g")
+
+
+def test_check_states_what_was_measured_and_what_the_model_is(campaign):
+    text = look(campaign)
+    assert text.endswith(FITS)
+    assert "  read      3 x 4096 samples at 4096 Hz, 1 s" in text
+    header, row = text[text.index("  excited") :].splitlines()[:2]
+    cells = dict(zip(re.split(r"  +", header.strip()), re.split(r"  +", row.strip()), strict=False))
+    assert (cells["excited"], cells["used"]) == ("15:+z", "3 of 3")
+    # a pulse of cos^4 that is 2.4 ms wide at its foot is 0.87 ms wide at half of its height
+    assert float(cells["pulse, ms"].split(" to ")[0]) == pytest.approx(0.87, rel=0.1)
+    assert [float(value) for value in cells["peak force, N"].split(" to ")] == pytest.approx([40, 60], rel=0.02)
+    assert 600 < float(cells["force up to, Hz"]) < 2048
+    assert float(re.search(r"  mass      (.*) kg", text)[1]) == pytest.approx(2700 * 0.5 * 0.025 * 0.005, rel=1e-3)
+    assert "  size      0.5 m along x" in text
+    peaks, model = (re.search(rf"  {name} +(.*) Hz", text)[1].split() for name in ("peaks", "  model"))
+    ratios = np.array(peaks, float) / np.array(model, float)
+    assert ratios == pytest.approx(np.sqrt(1 / 0.95), rel=2e-3)  # the model's modulus is 0.95 of the true one
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "says"),
+    [
+        ("modulus in GPa", ("youngs_modulus_Pa = 65550000000.0", "youngs_modulus_Pa = 65.55"), "GPa.*3.16.*e.04"),
+        ("density in g/cm^3", ("density_kg_m3 = 2700.0", "density_kg_m3 = 2.7"), "g/cm.3.*0.0316"),
+        ("thickness in mm", ("thickness_m = 0.005", "thickness_m = 5.0"), "(thickness|dimensions).*0.001"),
+        ("steel", ("youngs_modulus_Pa = 65550000000.0", "youngs_modulus_Pa = 195e9"), "modulus.*2.8. times too high"),
+        (
+            "held at the other end",
+            ('left = "clamped"\nright = "free"', 'left = "free"\nright = "clamped"'),
+            "held at the wrong end",
+        ),
+    ],
+    ids=lambda one: one.replace(" ", "_") if isinstance(one, str) else "",
+)
+def test_check_names_what_is_wrong_with_the_model(campaign, name, change, says):
+    del name
+    rewrite(campaign / "model.toml", change)
+    if "right =" in change[0]:  # the tip is held then, and no sensor can sit there
+        rewrite(campaign / "test.toml", ('dof = "21:+z"', 'dof = "20:+z"'))
+    text = look(campaign)
+    assert FITS not in text
+    assert re.search(says, open_points(text)[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda table: table * [1, 1, 1 / 9.80665], "g, and is read as m/s.2"),
+        (lambda table: table[:, [0, 2, 1]], "columns 'force' and 'acc' are exchanged"),
+        (lambda table: table * [1, 1, -1], "measures the other way round"),
+        (lambda table: table * [1000, 1, 1], "ms"),
+    ],
+    ids=["g", "columns", "sign", "ms"],
+)
+def test_check_names_what_is_wrong_with_the_recordings(campaign, change, says):
+    edit_recordings(campaign, change)
+    text = look(campaign)
+    assert FITS not in text
+    assert re.search(says, open_points(text)[0])
+
+
+def test_check_says_that_a_point_of_interest_is_measured(campaign):
+    rewrite(campaign / "pipeline.toml", ('points = ["11:+z"]', 'points = ["11:+z", "21:-z"]'))
+    (point,) = open_points(look(campaign))
+    assert point.startswith("the point of interest 21:-z is measured")
+
+
+def test_check_says_where_the_band_goes_on_in_noise(campaign):
+    """Above some 1000 Hz there is hardly any force: what a noisy sensor shows there is its noise."""
+    rng = np.random.default_rng(1)
+    edit_recordings(campaign, lambda table: table + [0, 0, 0.05 * np.ptp(table[:, 2])] * rng.normal(size=table.shape))
+    rewrite(campaign / "pipeline.toml", ("[10.0, 600.0]", "[10.0, 2000.0]"))
+    points = open_points(look(campaign))
+    says = r"\[fit\] band_hz ends at 2000 Hz, and the force at 15:\+z reaches up to \d+ Hz only"
+    assert any(re.match(says, point) for point in points)
+
+
+def test_check_lists_lines_that_nobody_has_looked_at(campaign):
+    only_recordings(campaign, lambda text: text)
+    (campaign / "model.toml").unlink()
+    write_starting_files(campaign)
+    path = campaign / "test.toml"
+    lines = path.read_text(encoding="utf-8").splitlines()
+    marked = [number for number, line in enumerate(lines, start=1) if line.endswith("CHECK")]
+    text = look(campaign)
+    assert FITS not in text
+    assert [int(number) for number in re.findall(rf"{re.escape(str(path))}:(\d+): ", text)] == marked
+    assert len(marked) > 2
+    path.write_text("\n".join(line.removesuffix("CHECK") for line in lines), encoding="utf-8")
+    assert look(campaign).endswith(FITS)
+
+
+def test_untouched_lines_are_no_error(campaign, monkeypatch, capsys):
+    rewrite(campaign / "test.toml", ('dof = "15:+z"', 'dof = "15:+z"   # where these impacts hit   CHECK'))
+    monkeypatch.setattr(sys, "argv", ["frf-ipz", "check", str(campaign)])
+    with pytest.raises(SystemExit) as stop:
+        command.main()
+    assert not stop.value.code
+    assert 'test.toml:17: dof = "15:+z"  (where these impacts hit)' in capsys.readouterr().out
+
+
+def test_check_names_a_point_whose_impacts_are_mostly_left_out(campaign):
+    def hit_twice(table):
+        shifted = np.roll(table[:, 1], 250)
+        return np.column_stack([table[:, 0], table[:, 1] + 0.6 * shifted, table[:, 2]])
+
+    edit_recordings(campaign, hit_twice)
+    points = open_points(look(campaign))
+    assert any(re.match(r"2 of the 3 records at 15:\+z are left out: 3 x double hit", point) for point in points)

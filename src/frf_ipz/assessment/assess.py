@@ -19,7 +19,9 @@ from frf_ipz.fe.eigen import solve_modes
 
 if TYPE_CHECKING:
     from frf_ipz.assessment.assessment import LikelyCause
+    from frf_ipz.assessment.causes.modal_comparison import MeasuredModes
     from frf_ipz.assessment.evidence import Evidence
+    from frf_ipz.structure import StructuralModel
 
 Ask: TypeAlias = "Callable[[Evidence], Iterator[Check]]"
 CHECKS: tuple[Ask, ...] = (
@@ -74,17 +76,40 @@ def likely_cause(evidence: Evidence) -> LikelyCause | None:
     exchanged = find_exchanged_columns(evidence.impacts, evidence.frfs.labels, test_file=evidence.test_file)
     if exchanged is not None:
         return exchanged
-    model = evidence.fe_model
-    n_modes = min(2 * evidence.fit.n_modes + MODES_BEYOND, len(model.dofs))
+    situation = compare_modes(
+        measured_modes(evidence.fit), evidence.fe_model, test_file=evidence.test_file, model_file=evidence.model_file
+    )
+    return None if situation is None else find_likely_cause(situation)
+
+
+def compare_modes(
+    measured: MeasuredModes, model: StructuralModel, *, test_file: str, model_file: str
+) -> Situation | None:
+    """Set the modes of an FE model beside measured ones, to look for a mistake.
+
+    Parameters
+    ----------
+    measured : MeasuredModes
+        Of a fit, or of a first look at the FRFs.
+    model : StructuralModel
+        The FE model as the user handed it in.
+    test_file, model_file : str
+        Names of the files that a mistake may stand in.
+
+    Returns
+    -------
+    Situation or None
+        None where the model has no modes that can be computed.
+    """
+    n_modes = min(2 * len(measured.frequency_hz) + MODES_BEYOND, len(model.dofs))
     try:
         modes = solve_modes(model, n_modes=n_modes)
     except NumericalError:
         return None
-    situation = Situation(
-        measured=measured_modes(evidence.fit),
+    return Situation(
+        measured=measured,
         computed=computed_modes(modes),
         model=model,
-        test_file=evidence.test_file,
-        model_file=evidence.model_file,
+        test_file=test_file,
+        model_file=model_file,
     )
-    return find_likely_cause(situation)

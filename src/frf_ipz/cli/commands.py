@@ -90,7 +90,7 @@ for _stage in HELP:
 @app.command()
 def check(pipeline: PipelineArgument) -> None:
     """Validate test, model and pipeline, draw the set-up, run nothing."""
-    from frf_ipz.pipeline.check import describe_setup
+    from frf_ipz.pipeline.check.setup import describe_setup
     from frf_ipz.pipeline.inputs import read_inputs
 
     say(describe_setup(read_inputs(pipeline)))

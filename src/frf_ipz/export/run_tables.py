@@ -43,6 +43,7 @@ RECORD = (
     Column("slowest_mode_hz", "float", "Hz", "frequency of that mode"),
     Column("snr_db", "float", "dB", "power of the response over its noise, median of the channels; null if unknown"),
     Column("force_noise_N", "float", "N", "standard deviation of the force outside of its pulse; null for a shaker"),
+    Column("force_band_hz", "float", "Hz", "up to where the force's spectrum stays within 20 dB of its largest value"),
     Column("step_s", "float", "s", "time step of the file"),
     Column("samples", "int", "1", "number of samples"),
     Column("trigger_s", "float", "s", "time from its start at which the force sets in"),
@@ -133,7 +134,7 @@ FIT = (
     Column("misfit", "float", "SI of the quantity per N", "root mean square of measured minus fitted"),
     Column("noise", "float", "SI of the quantity per N", "root mean square of the noise"),
     Column("ratio", "float", "1", "root mean square of misfit over noise, line by line"),
-    Column("delay_s", "float", "s", "fitted delay of the FRF; 0 unless [fit] delay = true"),
+    Column("delay_s", "float", "s", "delay of the FRF that the fit took off: 0 without one"),
     Column("gain", "float", "1", "measured FRF over the true one; 1 unless [fit] gain names one of its channels"),
     Column("gain_std", "float", "1", "standard deviation of the gain"),
 )

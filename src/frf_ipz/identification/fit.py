@@ -265,6 +265,13 @@ def _warnings(
             f"{sum(map(bool, unconfirmed))} of {len(unconfirmed)} modes do not come up in both halves of the lines: "
             "their quality is poor, and the decisions list them"
         )
+    if fitted.common_delay is not None:
+        delay, std = fitted.common_delay.delay_s, fitted.common_delay.std_s
+        late = "responses come later than the force" if delay > 0 else "the force comes later than the responses"
+        texts.append(
+            f"{late}, all by {1e3 * abs(delay):.4g} ms (+- {1e3 * std:.1g} ms), which the fit takes off: without it "
+            "the modes are not normal; [fit] delay = true fits each channel's delay, delay = false none"
+        )
     if fitted.drift is not None:
         texts.append(_drift_warning(frfs, fitted.drift, against_poles=fitted.poles_are_held))
     return tuple(texts)

@@ -101,6 +101,21 @@ class MeasuredLines:
         """Distance of lines, Hz."""
         return float(np.median(np.diff(self.frequency_hz)))
 
+    def advanced(self, delay_s: FloatArray) -> MeasuredLines:
+        """Take delays off.
+
+        Parameters
+        ----------
+        delay_s : (n_frfs,) array
+            Of each FRF, s.
+
+        Returns
+        -------
+        MeasuredLines
+            The FRFs as they are without the delays.
+        """
+        return replace(self, receptance=self.receptance * np.exp(self.s[:, None] * delay_s))
+
     def weighted(self, *, shared: bool = False) -> WeightedLines:
         """Weight each line by one over the standard deviation of each part of its noise.
 

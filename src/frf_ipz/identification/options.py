@@ -84,8 +84,9 @@ class FitOptions:
     max_order : int, optional
         Highest model order of the stabilisation diagram that the start is taken from; without it chosen from the number
         of references. Too few lines in the band lower it.
-    delay : bool
-        Fit a pure delay for each output channel too.
+    delay : bool, optional
+        true: fit a pure delay for each output channel too; false: none. Without it a delay that all responses share is
+        tried, and taken where it explains most of what normal modes leave.
     gain : tuple of str
         Channels whose constant gain is not known and is estimated; all others are trusted. A gain shows only where two
         FRFs must be equal but for gains: with excitation and sensor exchanged, or recorded by two channels.
@@ -110,7 +111,7 @@ class FitOptions:
     strike: tuple[RejectedPole, ...] = ()
     modes: Literal["complex", "real"] = "complex"
     max_order: Count | None = None
-    delay: bool = False
+    delay: bool | None = None
     gain: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

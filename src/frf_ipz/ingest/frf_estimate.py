@@ -46,8 +46,9 @@ class FrfEstimate(Tabulated, Drawn):
         One row a record: ``record`` (file, or file#number), ``input_dof``, ``peak_force_N``, ``pulse_s``, ``used``
         (bool), ``weight``, ``marks`` (what is wrong, joined by "; "), and what was measured to say so:
         ``second_pulse_ratio`` (height over the first), ``remaining_amplitude`` (share of its amplitude that the slowest
-        mode still has at the end) and ``slowest_mode_hz``, ``snr_db``, ``force_noise_N``, ``step_s``, ``samples``,
-        ``trigger_s``. Empty for FRFs that were estimated elsewhere.
+        mode still has at the end) and ``slowest_mode_hz``, ``snr_db``, ``force_noise_N``, ``force_band_hz`` (up to
+        where the force's spectrum stays within 20 dB of its largest value), ``step_s``, ``samples``, ``trigger_s``.
+        Empty for FRFs that were estimated elsewhere.
     traces : tuple of Trace
         Forces and responses to draw.
     choices : tuple of str

@@ -1,4 +1,11 @@
-"""One-to-one assignment in which either side may stay unmatched, and the margin of each choice."""
+"""One-to-one assignment in which either side may stay unmatched, and the probability of each choice.
+
+Costs are squared deviations, so an assignment is as likely as the exponential of minus half its cost. The alternatives
+of a row are its other columns, and none: each as likely as the cheapest assignment that holds it. All of these follow
+from the cheapest one, as shortest paths along which rows hand on their columns ([Ahuja1993], sec. 12.4).
+
+[Ahuja1993]: R. K. Ahuja, T. L. Magnanti, J. B. Orlin, Network Flows, Prentice Hall, 1993.
+"""
 
 from __future__ import annotations
 
@@ -22,21 +29,13 @@ class Matching:
         Column of each row; -1 where it stays unmatched.
     cost : float
         Of the whole assignment.
-    margin : (n,) array
-        Rise of the cost when a row may not have its partner; 0 for unmatched rows.
-    rival : (n,) int array
-        Partner of the row in that second-best assignment; -1 where it then stays unmatched.
     """
 
     partner: IntArray
     cost: float
-    margin: FloatArray
-    rival: IntArray
 
 
-def match(
-    costs: FloatArray, row_unmatched: FloatArray, column_unmatched: FloatArray, *, margins: bool = True
-) -> Matching:
+def match(costs: FloatArray, row_unmatched: FloatArray, column_unmatched: FloatArray) -> Matching:
     """Assign rows to columns.
 
     Parameters
@@ -47,8 +46,6 @@ def match(
         Cost of a row without a partner.
     column_unmatched : (m,) array
         Cost of a column without a partner.
-    margins : bool
-        Compute margins and rivals too.
 
     Returns
     -------
@@ -63,14 +60,41 @@ def match(
     """
     table = _with_unmatched(costs, row_unmatched, column_unmatched)
     partner, cost = _solve_assignment(table, *costs.shape)
-    margin, rival = np.zeros(len(costs)), np.full(len(costs), -1)
-    if margins:
-        for row in np.flatnonzero(partner >= 0):
-            changed = table.copy()
-            changed[row, partner[row]] = FORBIDDEN
-            second_partner, second_cost = _solve_assignment(changed, *costs.shape)
-            margin[row], rival[row] = second_cost - cost, second_partner[row]
-    return Matching(partner=partner, cost=cost, margin=margin, rival=rival)
+    return Matching(partner=partner, cost=cost)
+
+
+def pair_probabilities(costs: FloatArray, row_unmatched: FloatArray, column_unmatched: FloatArray) -> FloatArray:
+    """Give the probability of every pair, against the best assignments that hold another.
+
+    Parameters
+    ----------
+    costs, row_unmatched, column_unmatched
+        As for `match`.
+
+    Returns
+    -------
+    (n, m + 1) array
+        Of each row with each column, and of no partner; rows add up to 1.
+
+    Examples
+    --------
+    >>> pair_probabilities(np.array([[1.0, 1.0]]), np.array([40.0]), np.zeros(2)).round(2)
+    array([[0.5, 0.5, 0. ]])
+    """
+    n_rows, n_columns = costs.shape
+    if not n_rows:
+        return np.zeros((0, n_columns + 1))
+    table = _with_unmatched(costs, row_unmatched, column_unmatched)
+    _, holder_of = linear_sum_assignment(table)  # column of each row
+    rise = table[:, holder_of] - table[np.arange(len(table)), holder_of][:, None]  # row takes the column of another row
+    back = rise.copy()
+    for middle in range(len(back)):  # Floyd and Warshall; no cycle lowers the cost, for the assignment is the cheapest
+        back = np.minimum(back, back[:, middle, None] + back[middle])
+    owner = np.argsort(holder_of)  # row of each column
+    excess = (rise + back.T)[:n_rows, owner]
+    excess = np.column_stack([excess[:, :n_columns], excess[:, n_columns:].min(axis=1)])
+    likelihood = np.exp(-np.maximum(excess, 0.0) / 2)
+    return np.asarray(likelihood / likelihood.sum(axis=1, keepdims=True))
 
 
 def _with_unmatched(costs: FloatArray, row_unmatched: FloatArray, column_unmatched: FloatArray) -> FloatArray:

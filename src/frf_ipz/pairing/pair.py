@@ -22,9 +22,8 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.frf import FrfLabel
-    from frf_ipz.pairing.matching import Matching
 
-MIN_MARGIN = 1.0  # rise of the cost, in squared standard deviations, that a second-best assignment must have
+SURE = 0.95  # probability from which a pair becomes a target: a wrong one costs the update more than a missing one
 HARDLY_OBSERVABLE = 0.05  # amplitude over the mean amplitude, in every FRF, below which a mode need not show
 CANCELLING = 3.0  # standard deviations of distance below which a zero and a pole cannot be distinguished
 NO_ROOT = complex(np.nan, np.nan)
@@ -81,7 +80,7 @@ def _pole_rows(fit: ModalFit, model: ModelPoles, pairing: PolePairing) -> list[P
     rows = []
     for mode in range(fit.n_modes):
         partner = int(pairing.matching.partner[mode])
-        verdict, reason = _verdict(pairing.matching, mode, model.values, "mode")
+        verdict, reason = _verdict(partner, pairing.probabilities[mode], model.values, "mode")
         rows.append(_row("pole", -1, mode, partner, fit.model.poles[mode], model.values, pairing, verdict, reason))
     observability = np.abs(model.amplitudes) / np.sqrt(np.mean(np.abs(model.amplitudes) ** 2, axis=0))
     inside = in_band(model.values, fit.band_hz, _paired_logs(rows))
@@ -102,7 +101,7 @@ def _zero_rows(
     for row, zero in enumerate(pairing.measured):
         value = fit.zeros.values[zero]
         partner = int(pairing.matching.partner[row])
-        verdict, reason = _verdict(pairing.matching, row, model.values, "zero")
+        verdict, reason = _verdict(partner, pairing.probabilities[row], model.values, "zero")
         verdict, reason = _exclusion(fit, int(zero)) or (verdict, reason)
         rows.append(_row("zero", frf, int(zero), partner, value, model.values, pairing, verdict, reason, row=row))
     inside = in_band(model.values, fit.band_hz, paired_poles) & (np.array(model.kind) != "real")
@@ -112,14 +111,19 @@ def _zero_rows(
     return rows
 
 
-def _verdict(matching: Matching, row: int, computed: np.ndarray, what: str) -> tuple[PairVerdict, str]:
-    partner, rival = int(matching.partner[row]), int(matching.rival[row])
+def _verdict(partner: int, probability: FloatArray, computed: np.ndarray, what: str) -> tuple[PairVerdict, str]:
     if partner < 0:
         return PairVerdict.MISSING_IN_MODEL, f"the model has no {what} near enough in frequency, kind and shape"
-    if matching.margin[row] >= MIN_MARGIN:
-        return PairVerdict.PAIRED, f"the next best choice is worse by {matching.margin[row]:.1f} squared deviations"
-    alternative = "no partner" if rival < 0 else f"the one at {abs(computed[rival]) / (2 * np.pi):.5g} Hz"
-    return PairVerdict.AMBIGUOUS, f"{alternative} would be as likely (worse by {matching.margin[row]:.1f})"
+    if probability[partner] >= SURE:
+        return PairVerdict.PAIRED, f"probability {probability[partner]:.3f}"
+    others = np.where(np.arange(len(probability)) == partner, 0.0, probability)
+    rival = int(np.argmax(others))
+    is_none = rival == len(probability) - 1
+    alternative = "no partner" if is_none else f"the one at {abs(computed[rival]) / (2 * np.pi):.5g} Hz"
+    return (
+        PairVerdict.AMBIGUOUS,
+        f"probability {probability[partner]:.2f}; {alternative} is it with probability {others[rival]:.2f}",
+    )
 
 
 def _exclusion(fit: ModalFit, zero: int) -> tuple[PairVerdict, str] | None:
@@ -184,8 +188,9 @@ def _unmeasured(kind: str, frf: int, computed: int, value: complex, reason: str)
 
 
 def _paired_logs(rows: list[Pair]) -> tuple[FloatArray, FloatArray]:
-    """Logarithms of the moduli of paired poles, measured and computed."""
-    paired = [row for row in rows if row.kind == "pole" and row.computed >= 0 and row.measured >= 0]
+    """Logarithms of the moduli of paired poles, measured and computed; of the likeliest where none is sure."""
+    joined = [row for row in rows if row.kind == "pole" and row.computed >= 0 and row.measured >= 0]
+    paired = [row for row in joined if row.verdict is PairVerdict.PAIRED] or joined
     return (
         np.log(np.abs([row.measured_value for row in paired])),
         np.log(np.abs([row.computed_value for row in paired])),

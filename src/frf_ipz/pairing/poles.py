@@ -14,13 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.pairing.matching import Matching, match
+from frf_ipz.pairing.frequency_scatter import NARROWER, frequency_cost
+from frf_ipz.pairing.matching import Matching, match, pair_probabilities
 from frf_ipz.pairing.model_roots import ModelPoles
 
 if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
 
 FREQUENCY_STD = 0.05  # of the logarithm of a frequency, after the common factor
+LIKELY_FACTORS = 5  # tried for each narrow scatter: those with which most frequencies agree
 COMMON_STD = 0.08  # of the logarithm of the common factor
 COMMON_STEPS = 17  # of the search for it, over three standard deviations to each side
 FREQUENCY_GATE = 0.3  # logarithm beyond which two poles are not the same whatever the shapes say
@@ -38,6 +40,8 @@ class PolePairing:
     ----------
     matching : Matching
         Rows are measured poles, columns the model's.
+    probabilities : (n_measured, n_model + 1) array
+        Of every pair, over all common factors and scatters; the last column is that of no partner.
     costs : (n_measured, n_model) array
         Of every pair.
     gains : (n_frfs,) array
@@ -45,6 +49,7 @@ class PolePairing:
     """
 
     matching: Matching
+    probabilities: FloatArray
     costs: FloatArray
     gains: FloatArray
 
@@ -71,11 +76,16 @@ def pair_poles(fit: ModalFit, model: ModelPoles) -> PolePairing:
     band = np.log(2 * np.pi * np.array(fit.band_hz))
     gains = np.ones(len(fit.labels))
     for _ in range(ROUNDS):
-        matching, costs = _over_common_factors(measured, computed, shapes, band)
-        gains = _gains(amplitudes, model.amplitudes, noise, matching.partner)
+        best, *_ = _tried(measured, computed, shapes, band)
+        gains = _gains(amplitudes, model.amplitudes, noise, best.matching.partner)
         shapes = _shape_costs(amplitudes, model.amplitudes, noise, gains)
-    matching, costs = _over_common_factors(measured, computed, shapes, band, margins=True)
-    return PolePairing(matching=matching, costs=costs, gains=gains)
+    tried = _tried(measured, computed, shapes, band)
+    return PolePairing(
+        matching=tried[0].matching,
+        probabilities=_over_all(tried),
+        costs=tried[0].costs,
+        gains=gains,
+    )
 
 
 def measured_amplitudes(fit: ModalFit) -> tuple[ComplexArray, FloatArray]:
@@ -100,22 +110,60 @@ def measured_amplitudes(fit: ModalFit) -> tuple[ComplexArray, FloatArray]:
     return fit.model.residues[: fit.n_modes] * to_amplitude, std * np.abs(to_amplitude)
 
 
-def _over_common_factors(
-    measured: FloatArray, computed: FloatArray, shapes: FloatArray, band: FloatArray, *, margins: bool = False
-) -> tuple[Matching, FloatArray]:
-    best: tuple[float, Matching, FloatArray] | None = None
-    for offset in COMMON_STD * np.linspace(-3, 3, COMMON_STEPS):
-        gap = measured[:, None] - computed - offset
-        costs = (gap / FREQUENCY_STD) ** 2 + shapes
-        costs[np.abs(measured[:, None] - computed) > FREQUENCY_GATE] = np.inf
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Hypothesis:
+    """One common factor with one scatter of the frequencies, and the cheapest assignment under it."""
+
+    matching: Matching
+    costs: FloatArray
+    unmatched: tuple[FloatArray, FloatArray]
+    total: float
+
+
+def _tried(measured: FloatArray, computed: FloatArray, shapes: FloatArray, band: FloatArray) -> list[_Hypothesis]:
+    """All common factors and scatters that are tried, the most likely first."""
+    gaps = measured[:, None] - computed
+    grid = COMMON_STD * np.linspace(-3, 3, COMMON_STEPS)
+    hypotheses = [(float(offset), FREQUENCY_STD) for offset in grid]
+    for scatter in (FREQUENCY_STD / NARROWER).tolist():
+        hypotheses += [(offset, scatter) for offset in _likely_factors(gaps, shapes, scatter)]
+    tried = []
+    for offset, scatter in hypotheses:
+        costs = frequency_cost(gaps - offset, FREQUENCY_STD, scatter) + shapes
+        costs[np.abs(gaps) > FREQUENCY_GATE] = np.inf
         in_band = (computed + offset > band[0]) & (computed + offset < band[1])
-        matching = match(costs, np.full(len(measured), UNMATCHED), np.where(in_band, UNMATCHED, 0.0), margins=margins)
-        total = matching.cost + (offset / COMMON_STD) ** 2
-        if best is None or total < best[0]:
-            best = total, matching, costs
-    if best is None:  # the search above is never empty
-        raise AssertionError
-    return best[1], best[2]
+        unmatched = np.full(len(measured), UNMATCHED), np.where(in_band, UNMATCHED, 0.0)
+        matching = match(costs, *unmatched)
+        # of factors as exact as the scatter, more could have been tried than there are steps of the grid
+        choice = 2 * np.log(max((grid[1] - grid[0]) / scatter, 1.0))
+        total = matching.cost + (offset / COMMON_STD) ** 2 + choice
+        tried.append(_Hypothesis(matching=matching, costs=costs, unmatched=unmatched, total=total))
+    return sorted(tried, key=lambda hypothesis: hypothesis.total)
+
+
+def _likely_factors(gaps: FloatArray, shapes: FloatArray, scatter: float) -> list[float]:
+    """Factors with which most frequencies of like shapes agree to within a scatter."""
+    candidates = np.abs(gaps) < min(3 * COMMON_STD, FREQUENCY_GATE)
+    offsets, weights = gaps[candidates], np.exp(-shapes[candidates] / 2)
+    votes = np.array([weights @ np.exp(-(((offsets - offset) / scatter) ** 2) / 2) for offset in offsets])
+    chosen: list[float] = []
+    for place in np.argsort(-votes):
+        if len(chosen) == LIKELY_FACTORS:
+            break
+        if all(abs(offsets[place] - other) > scatter for other in chosen):
+            chosen.append(float(offsets[place]))
+    return chosen
+
+
+def _over_all(tried: list[_Hypothesis]) -> FloatArray:
+    """Probability of every pair, over all hypotheses."""
+    totals = np.array([hypothesis.total for hypothesis in tried])
+    weights = np.exp(-(totals - totals.min()) / 2)
+    weights /= weights.sum()
+    likely = np.flatnonzero(weights > np.finfo(float).eps)
+    return np.asarray(
+        sum(weights[place] * pair_probabilities(tried[place].costs, *tried[place].unmatched) for place in likely)
+    )
 
 
 def _gains(measured: ComplexArray, computed: ComplexArray, noise: FloatArray, partner: IntArray) -> FloatArray:

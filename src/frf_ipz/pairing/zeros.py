@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.pairing.matching import Matching, match
+from frf_ipz.pairing.frequency_scatter import NARROWER, frequency_cost
+from frf_ipz.pairing.matching import Matching, match, pair_probabilities
 from frf_ipz.rational import PoleResidueModel
 
 if TYPE_CHECKING:
@@ -37,12 +38,15 @@ class ZeroPairing:
         Indices of the FRF's zeros among all measured ones.
     matching : Matching
         Rows are those, columns the model's zeros.
+    probabilities : (n, m + 1) array
+        Of every pair; the last column is that of no partner.
     costs : (n, m) array
         Of every pair.
     """
 
     measured: IntArray
     matching: Matching
+    probabilities: FloatArray
     costs: FloatArray
 
 
@@ -72,16 +76,28 @@ def pair_zeros(
     measured = np.flatnonzero(fit.zeros.frf == frf)
     values = fit.zeros.values[measured]
     gap = map_frequency(np.log(np.abs(values)), *poles)[:, None] - np.log(np.abs(model.values))
-    costs = (gap / ZERO_STD) ** 2
     slopes = measured_slope_sign(fit.model, frf, fit.labels[frf].quantity.power, values) * np.sign(polarity)
-    costs += WRONG_SLOPE * (slopes[:, None] * model.slope_sign < 0)
+    wrong = WRONG_SLOPE * (slopes[:, None] * model.slope_sign < 0)
     kinds = np.array([fit.zeros.kind[zero] for zero in measured], dtype=object)
     is_pairable = np.isin(kinds.astype(str), PAIRABLE) & fit.zeros.identifiable[measured]
     is_same_kind = kinds[:, None] == np.array(model.kind, dtype=object)
-    costs = np.where(is_pairable[:, None] & is_same_kind & (np.abs(gap) < ZERO_GATE), costs, np.inf)
+    is_allowed = is_pairable[:, None] & is_same_kind & (np.abs(gap) < ZERO_GATE)
     unmeasured = np.where(in_band(model.values, fit.band_hz, poles), UNMEASURED, 0.0)
+    unmatched = np.full(len(values), UNMATCHED), unmeasured
+    tried = []
+    for scatter in (ZERO_STD, *(ZERO_STD / NARROWER).tolist()):
+        costs = np.where(is_allowed, frequency_cost(gap, ZERO_STD, scatter) + wrong, np.inf)
+        tried.append((match(costs, *unmatched), costs))
+    weights = np.exp(-(np.array([matching.cost for matching, _ in tried]) - min(m.cost for m, _ in tried)) / 2)
+    matching, costs = tried[int(np.argmax(weights))]
+    shares = weights / weights.sum()
     return ZeroPairing(
-        measured=measured, matching=match(costs, np.full(len(values), UNMATCHED), unmeasured), costs=costs
+        measured=measured,
+        matching=matching,
+        probabilities=np.asarray(
+            sum(share * pair_probabilities(each, *unmatched) for share, (_, each) in zip(shares, tried, strict=True))
+        ),
+        costs=costs,
     )
 
 

@@ -55,6 +55,8 @@ SIDES = {"above": "top", "below": "bottom"}
 FIELDS = {"x": "x", "y": "y", "text": "text", "value": "customdata"}
 WHOLE = {"cliponaxis": False}  # words at the rim of a picture are not cut
 PLAIN_TICKS = {"tickformat": ".10~g"}  # 20, 50, 100, 200
+DECADES_A_TICK = 0.31  # plotly labels 1, 2 and 5 of each decade for 0.3 to 0.7 decades a tick
+FEWEST_TICKS = 3
 POWERS = {"exponentformat": "power", "minorloglabels": "complete"}  # else plotly writes 2 x 10^-7 as 2
 ALWAYS_CLEAR = {"marker": {"opacity": 1.0}}  # points outside a range that is chosen stay as clear as they were
 
@@ -482,7 +484,9 @@ def _axis(axis: Axis, side: str, panel: Panel) -> dict[str, Any]:
     if axis.limits is not None:
         drawn["range"] = [float(np.log10(end)) if is_logarithm else float(end) for end in axis.limits]
     if is_logarithm:
-        drawn |= PLAIN_TICKS if axis.tick_step is None and _is_plain(axis, side, panel) else POWERS
+        low, high = axis.limits or _extent(side, panel)
+        is_plain = axis.tick_step is None and PLAIN_NUMBERS[0] < low and high < PLAIN_NUMBERS[1]
+        drawn |= {**PLAIN_TICKS, "nticks": _most_ticks(low, high)} if is_plain else POWERS
     if axis.ticks is not None:
         drawn |= {"tickvals": list(axis.ticks), "ticktext": _texts(axis.tick_labels)}
     if axis.tick_step is not None:
@@ -494,17 +498,18 @@ def _axis(axis: Axis, side: str, panel: Panel) -> dict[str, Any]:
     return drawn | _frame(axis, side, panel)
 
 
-def _is_plain(axis: Axis, side: str, panel: Panel) -> bool:
-    """Tell whether all that a logarithmic axis shows can be read as plain numbers."""
-    if axis.limits is None:
-        names = ("x",) if side == "x" else ("y", "low", "high", "sizes")
-        parts = [getattr(layer, name, None) for layer in panel.layers for name in names]
-        shown = np.concatenate([np.ravel(part) for part in parts if isinstance(part, np.ndarray)] or [np.zeros(0)])
-        shown = shown[np.isfinite(shown) & (shown > 0)]
-        low, high = (float(shown.min()), float(shown.max())) if shown.size else (1.0, 1.0)
-    else:
-        low, high = axis.limits
-    return PLAIN_NUMBERS[0] < low and high < PLAIN_NUMBERS[1]
+def _extent(side: str, panel: Panel) -> tuple[float, float]:
+    """Give the smallest and the largest positive number of what a logarithmic axis shows."""
+    names = ("x",) if side == "x" else ("y", "low", "high", "sizes")
+    parts = [getattr(layer, name, None) for layer in panel.layers for name in names]
+    shown = np.concatenate([np.ravel(part) for part in parts if isinstance(part, np.ndarray)] or [np.ones(1)])
+    shown = shown[np.isfinite(shown) & (shown > 0)]
+    return (float(shown.min()), float(shown.max())) if shown.size else (1.0, 1.0)
+
+
+def _most_ticks(low: float, high: float) -> int:
+    """Give as many ticks as make 20, 50, 100, 200: with more, plotly labels 30, 40 and 60 to 90 too."""
+    return max(int(np.log10(high / low) / DECADES_A_TICK), FEWEST_TICKS)
 
 
 def _frame(axis: Axis, side: str, panel: Panel) -> dict[str, Any]:

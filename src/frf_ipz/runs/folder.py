@@ -65,6 +65,13 @@ JSON_KEYS = {
     "assessment.likely_cause.file": "the file in which it stands",
     "assessment.likely_cause.line_or_key": "the key or line in it",
     "assessment.likely_cause.probability": "that it is this, given what was measured",
+    "assessment.deviations": "how far the models are from what was measured, at the points of interest first",
+    "assessment.deviations.*.at": "points of interest or measured points",
+    "assessment.deviations.*.frf": "the FRF that the updated model meets worst",
+    "assessment.deviations.*.band_hz": "first and last line that was compared",
+    "assessment.deviations.*.nominal_db": "median difference of magnitudes before updating",
+    "assessment.deviations.*.updated_db": "the same after updating",
+    "assessment.deviations.*.with_causes_db": "the same with what the diagnosis found; null where that is not known",
     "notes": "what was damaged in the folder and has been made again; absent where nothing was",
     "stages.*.key": "digest of everything that the result of the stage depends on",
     "stages.*.seconds": "computing time, s",
@@ -237,8 +244,10 @@ class RunFolder:
             If a file cannot be written or replaced: then the folder is as it was.
         """
         before = read_manifest(self.current)
-        if not self.computed and _lasting(before) == _lasting(self.manifest) and generations.is_in_place():
-            return  # who has opened the results reads on
+        if self.current != self.path:
+            self._say_repaired(generations.out_of_place())
+            if not self.computed and _lasting(before) == _lasting(self.manifest):
+                return  # who has opened the results reads on
         text = json.dumps(self.manifest, indent=1, ensure_ascii=False) + "\n"
         write_text(generations.staging / MANIFEST, text)
         generations.adopt([MANIFEST, *_names(before)])
@@ -276,9 +285,10 @@ class RunFolder:
         return damaged
 
     def _say_repaired(self, files: Iterable[str]) -> None:
-        said = self.manifest.setdefault("notes", [])
+        said = self.manifest.get("notes", [])
         notes = [f"{file} was damaged or gone, and has been made again" for file in files]
-        said += [note for note in notes if note not in said]
+        if notes:
+            self.manifest["notes"] = list(dict.fromkeys([*said, *notes]))
 
     def _write(self, name: str, files: Writers) -> None:
         if self.staging is None:
@@ -378,12 +388,28 @@ def _removing_hidden(hidden: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        if not (current_folder(hidden.parent) / MANIFEST).is_file():
+        if not holds_run(hidden.parent):
             with suppress(OSError):
                 forget_empty(hidden.parent)
                 (hidden / HOLDER).unlink(missing_ok=True)
                 (hidden / LOCK).unlink(missing_ok=True)
                 hidden.rmdir()
+
+
+def holds_run(path: Path) -> bool:
+    """Tell whether a run has been made in a folder.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+
+    Returns
+    -------
+    bool
+        False too while the first one takes its place.
+    """
+    return (current_folder(path) / MANIFEST).is_file()
 
 
 def read_run(path: Path) -> RunFolder:
@@ -405,7 +431,7 @@ def read_run(path: Path) -> RunFolder:
         If no run has been made there, `run.json` is damaged, or another version made it, with results of another form.
     """
     current = current_folder(path)
-    if not (current / MANIFEST).is_file():
+    if not holds_run(current):
         raise InputError(
             f"{path}: there is no run here (no {MANIFEST}); make one with 'frf-ipz run PIPELINE --out {path}'"
         )

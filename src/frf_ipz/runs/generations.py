@@ -157,17 +157,15 @@ class Generations:
         write_text(self.path / HIDDEN / POINTER, "0\n")
         self.current = adopted
 
-    def is_in_place(self) -> bool:
-        """Tell whether the files that users open are those of the current generation.
+    def out_of_place(self) -> list[str]:
+        """List files that users open and that are not what the current generation has of them.
 
         Returns
         -------
-        bool
-            False where there is none.
+        list of str
+            Those that somebody has changed or removed.
         """
-        return self.current != self.path and all(
-            _is_same(self.path / name, self.current / name) for name in _files(self.current)
-        )
+        return [name for name in _files(self.current) if not _is_same(self.path / name, self.current / name)]
 
     def keep(self, names: Iterable[str]) -> None:
         """Take files of the current generation over into the new one.

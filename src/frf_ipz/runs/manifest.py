@@ -43,6 +43,10 @@ def load_manifest(folder: Path) -> dict[str, Any]:
         _require(path, name, manifest.get(name, ""), str)
     for name in TABLES:
         _require(path, name, manifest.get(name, {}), dict)
+    notes = manifest.get("notes", [])
+    _require(path, "notes", notes, list)
+    for note in notes:
+        _require(path, "notes", note, str)
     for name in ("packages", "test", "inputs"):
         for key, value in manifest.get(name, {}).items():
             _require(path, f"{name}.{key}", value, str)

@@ -74,6 +74,8 @@ def summarise(results: Results) -> str:
             lines += _lines_of(stage, write(result), notes, results)
     has_page = results.path is not None and "report" in results.stages and "report" not in results.stale
     lines += [f"{title:<12}{text}" for title, text in note_lines(notes, has_page=has_page)]
+    mended = results.manifest.get("notes", [])
+    lines += [f"{'' if place else 'mended':<12}{note}" for place, note in enumerate(mended)]
     seconds = sum(entry.get("seconds", 0.0) for entry in results.manifest.get("stages", {}).values())
     lines.append(f"{'results':<12}{results.path or 'in memory'}  ({seconds:.1f} s of computing)")
     if results.path is not None and has_page:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
 from frf_ipz.pipeline.pipeline_folder import pipelines_in
-from frf_ipz.runs.folder import read_manifest
+from frf_ipz.runs.folder import holds_run, read_manifest
 from frf_ipz.runs.manifest import MANIFEST
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def find_runs(folder: Path) -> tuple[RunPaths, ...]:
     folder = folder.resolve()
     runs, pipelines = [], []
     for here in _folders(folder):
-        runs += [_run_in(here)] if (here / MANIFEST).is_file() else []
+        runs += [_run_in(here)] if holds_run(here) else []
         pipelines += pipelines_in(here)
     ran = {run.pipeline for run in runs}
     new = [RunPaths(folder=file.parent / RESULTS / file.stem, pipeline=file) for file in pipelines if file not in ran]
@@ -76,7 +76,7 @@ def _folders(folder: Path) -> Iterator[Path]:
     """Give the folders that may hold a run or a pipeline, from the top; nothing is searched inside a run."""
     for path, below, _ in os.walk(folder):
         here = Path(path)
-        is_run, depth = (here / MANIFEST).is_file(), len(here.relative_to(folder).parts)
+        is_run, depth = holds_run(here), len(here.relative_to(folder).parts)
         names = [] if is_run or depth >= DEEPEST else [name for name in sorted(below) if not name.startswith(".")]
         below[:] = names
         yield here

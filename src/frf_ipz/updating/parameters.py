@@ -41,7 +41,8 @@ SENSOR_KG = 2e-3  # of the mass of a sensor that the model does not contain: acc
 MASS_STD = 0.02  # masses are known better than stiffness
 SCALE_UNCERTAINTY = 1.0  # standard deviation of the logarithm of each of these: the data may ask for others
 SAME_POSITION = 1e-9  # of the variance, by which two parts at one position differ, so that it has a root
-MAX_FREE_MODES = 24  # a change among higher modes hardly moves what was measured
+FREE_MODES = 24  # a change among higher modes hardly moves what was measured, where the band holds fewer
+MOST_FREE_MODES = 48  # of a model with more modes in its basis: a change of each pair is a matrix to be kept
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -180,8 +181,9 @@ def generic_basis(model: ReducedModel, *, std: float = GENERIC_STD_ALONE, common
         One parameter an entry; rigid-body modes do not change, as changes are relative to the stiffness.
     """
     poles = undamped_poles(model.mass, model.stiffness)
-    omega = np.sqrt(np.maximum(poles.values.real, 0.0))[:MAX_FREE_MODES]
-    shares = omega * (model.mass @ poles.right_vectors.real)[:, :MAX_FREE_MODES]
+    n_free = max(FREE_MODES, min(model.n_modes, MOST_FREE_MODES))
+    omega = np.sqrt(np.maximum(poles.values.real, 0.0))[:n_free]
+    shares = omega * (model.mass @ poles.right_vectors.real)[:, :n_free]
     first, second = np.triu_indices(len(omega))
     products = np.einsum("ak,bk->kab", shares[:, first], shares[:, second])
     diagonal = first == second

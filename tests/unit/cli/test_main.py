@@ -53,7 +53,7 @@ def test_a_name_that_the_console_has_no_letters_for_stops_nothing(monkeypatch):
     monkeypatch.setattr(sys, "stdout", narrow)
     monkeypatch.setattr(sys, "argv", ["frf-ipz", "check", "pipeline.toml"])
     monkeypatch.setattr("frf_ipz.pipeline.inputs.read_inputs", lambda path: path)
-    monkeypatch.setattr("frf_ipz.pipeline.check.describe_setup", lambda inputs: f"Träger \u6881 of {inputs}")
+    monkeypatch.setattr("frf_ipz.pipeline.check.setup.describe_setup", lambda inputs: f"Träger \u6881 of {inputs}")
     with pytest.raises(SystemExit) as stopped:
         main()
     assert not stopped.value.code

@@ -7,7 +7,10 @@ import pytest
 
 from frf_ipz.errors import InputError, NoModesError
 from frf_ipz.identification.fit import fit_modes, fit_residues
+from frf_ipz.identification.likelihood.smooth_terms import smooth_terms_of_band
+from frf_ipz.identification.measured_lines import measured_lines
 from frf_ipz.identification.options import FitOptions, PinnedPole, RejectedPole
+from frf_ipz.identification.search.delays import common_delay
 from frf_ipz.quantities import FrfQuantity
 from synthetic_frfs import accelerances, count, frf_set, labels_of, normalised_errors, random_modes, with_noise
 
@@ -233,6 +236,49 @@ def test_delays_of_channels():
     assert_complete(fit, truth)
     np.testing.assert_allclose(fit.model.delay_s, delay_s, rtol=0, atol=5e-7)  # 0.05 % of the shortest period
     assert np.sqrt(np.mean(fit.misfit["ratio"] ** 2)) < 1.1
+
+
+@pytest.mark.parametrize("samples", [3.4, 0.4, -1.7])
+def test_a_delay_that_all_responses_share_is_found(samples):
+    truth = random_modes(SPREAD, 0.005, n_outputs=2, n_inputs=1, seed=SEED)
+    frfs = accelerances(truth, LINES_HZ, noise=1e-3, seed=SEED)
+    delay_s = samples / 2048
+    late = replace(frfs, values=frfs.values * np.exp(-frfs.s[:, None] * delay_s))
+    fit = fit_modes(late, options=FitOptions())
+    assert_complete(fit, truth)
+    np.testing.assert_allclose(fit.model.delay_s, delay_s, rtol=0, atol=5e-7)  # 0.05 % of the shortest period
+    (warning,) = [text for text in fit.warnings if "ms" in text]
+    assert f"all by {1e3 * abs(delay_s):.3g}" in warning
+    assert ("responses come later" in warning) == (samples > 0)
+    assert not fit_modes(late, options=FitOptions(delay=False)).model.delay_s.any()
+
+
+def test_the_deviation_of_a_common_delay_is_true():
+    truth = random_modes(SPREAD, 0.005, n_outputs=2, n_inputs=1, seed=SEED)
+    errors = []
+    for seed in range(12):
+        frfs = accelerances(truth, LINES_HZ[3::4], noise=0.02, seed=seed)
+        late = replace(frfs, values=frfs.values * np.exp(-frfs.s[:, None] * 1e-3))
+        lines = measured_lines(late, FitOptions())
+        terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(3)
+        delay = common_delay(lines, truth.poles, terms, lambda _: truth.poles)
+        errors.append((delay.delay_s - 1e-3) / delay.std_s)
+    assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.5  # 12 numbers: three standard deviations
+
+
+def test_complex_modes_are_no_delay():
+    rng = np.random.default_rng(SEED)
+    truth = random_modes(SPREAD, 0.005, n_outputs=3, n_inputs=1, seed=SEED)
+    phases = np.exp(0.2j * rng.standard_normal((len(SPREAD), 3)))
+    s = 2j * np.pi * LINES_HZ
+    residues = truth.residues() * phases
+    values = (1 / (s[:, None] - truth.poles)) @ residues + (1 / (s[:, None] - truth.poles.conj())) @ residues.conj()
+    values *= s[:, None] ** 2
+    std = 1e-3 * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
+    fit = fit_modes(with_noise(LINES_HZ, values, labels_of(3, 1), std, rng), options=FitOptions())
+    assert_complete(fit, truth)
+    assert not fit.model.delay_s.any()
+    assert fit.warnings == ()
 
 
 def test_pinned_and_rejected_poles():

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.ingest.records import read_records
+from frf_ipz.ingest.signals.pulses import force_band
 from synthetic_campaign import HIT, Structure, hammer_campaign, impact, pulse, write_csv, write_test
 
 STEP_S = 1 / 2048
@@ -289,3 +291,27 @@ def test_rest_before_an_impact_in_coarse_digital_steps_is_no_dropout(tmp_path):
         write_csv(tmp_path / "hits" / f"{number}.csv", signals, STEP_S)
     result = estimate(write_test(tmp_path, HIT))
     assert not any("dropout" in marks for marks in result.records.marks)
+
+
+@pytest.mark.parametrize("n_samples", [40, 400])
+def test_the_force_of_a_half_sine_reaches_where_its_spectrum_has_fallen_by_20_db(n_samples):
+    """Its transform is cos(pi f T) / (1 - 4 f^2 T^2) of its value at 0."""
+    end = brentq(lambda ratio: abs(np.cos(np.pi * ratio) / (1 - 4 * ratio**2)) - 0.1, 0.6, 1.5)
+    half_sine = np.sin(np.pi * np.arange(n_samples + 1) / n_samples)
+    line = 1 / (8 * n_samples)  # of the padded spectrum: the end is read off its lines
+    assert force_band(half_sine) == pytest.approx(end / n_samples, abs=line)
+
+
+def test_a_pulse_of_one_sample_reaches_all_frequencies():
+    assert force_band(np.array([1.0])) == 0.5
+
+
+def test_the_band_of_each_impact_is_in_the_table(tmp_path):
+    """The transform of a normal pulse of standard deviation t falls by 20 dB at sqrt(ln 10 / 2) / (pi t)."""
+    lengths_s = (0.001, 0.002)
+    for name, length_s in zip("ab", lengths_s, strict=True):
+        signals = impact(Structure(), force=pulse(N_SAMPLES, STEP_S, length_s=length_s))
+        write_csv(tmp_path / "hits" / f"{name}.csv", signals, STEP_S)
+    bands_hz = estimate(write_test(tmp_path, HIT)).records["force_band_hz"]
+    expected_hz = [np.sqrt(np.log(10) / 2) / np.pi / length_s for length_s in lengths_s]
+    assert bands_hz.tolist() == pytest.approx(expected_hz, rel=0.03)  # the lines of the spectrum that it is read off

@@ -1,4 +1,4 @@
-"""The assignment is the cheapest one, with the right margin."""
+"""The assignment is the cheapest one, and as sure as its alternatives let it be."""
 
 from itertools import permutations
 
@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from frf_ipz.pairing.matching import match
+from frf_ipz.pairing.matching import match, pair_probabilities
+from frf_ipz.pairing.pair import SURE
 
 
 def cheapest(costs, row_alone, column_alone):
@@ -31,25 +32,45 @@ def test_the_assignment_is_the_cheapest_of_all(seed):
     assert_allclose(match(costs, *alone).cost, cheapest(costs, *alone), rtol=1e-12)
 
 
-def test_the_margin_is_what_the_second_best_costs_more():
-    costs = np.array([[1.0, 3.0], [9.0, 2.0]])
-    matching = match(costs, np.full(2, 5.0), np.zeros(2))
-    assert matching.partner.tolist() == [0, 1]
-    # without (0, 0): 0 takes 1 (3) and 1 stays alone (5): 8; or 0 stays alone (5) and 1 keeps 1 (2): 7
-    assert_allclose(matching.margin, [4.0, 3.0], rtol=1e-12)
-    assert matching.rival.tolist() == [-1, -1]
+def probabilities_by_trying(costs, row_alone, column_alone):
+    """Probability of every pair over all assignments."""
+    rows, columns = costs.shape
+    share = np.zeros((rows, columns + 1))
+    for choice in set(permutations([*range(columns), *[-1] * rows], rows)):
+        total = sum(costs[row, column] if column >= 0 else row_alone[row] for row, column in enumerate(choice))
+        total += sum(column_alone[column] for column in range(columns) if column not in choice)
+        share[np.arange(rows), choice] += np.exp(-total / 2)
+    return share / share.sum(axis=1, keepdims=True)
 
 
-def test_a_rival_is_named():
-    matching = match(np.array([[1.0, 1.5]]), np.array([9.0]), np.zeros(2))
-    assert (matching.partner[0], matching.rival[0]) == (0, 1)
-    assert_allclose(matching.margin, [0.5], rtol=1e-12)
+@given(st.integers(0, 10_000))
+def test_a_sure_pair_is_sure_over_all_assignments(seed):
+    rng = np.random.default_rng(seed)
+    rows, columns = rng.integers(1, 5, 2)
+    given_costs = rng.uniform(0, 15, (rows, columns)), np.full(rows, 9.0), np.full(columns, 9.0)
+    found, exact = pair_probabilities(*given_costs), probabilities_by_trying(*given_costs)
+    assert_allclose(found.sum(axis=1), 1.0, rtol=1e-12)
+    sure = found >= SURE
+    assert (exact[sure] > SURE - 0.06).all()  # alternatives of the same best assignment count once
+    assert (found.argmax(axis=1)[sure.any(axis=1)] == exact.argmax(axis=1)[sure.any(axis=1)]).all()
+
+
+def test_one_row_has_the_probabilities_of_its_costs():
+    found = pair_probabilities(np.array([[1.0, 3.0]]), np.array([5.0]), np.zeros(2))
+    weights = np.exp(-np.array([1.0, 3.0, 5.0]) / 2)
+    assert_allclose(found, [weights / weights.sum()], rtol=1e-12)
+
+
+def test_rows_that_could_exchange_their_columns_are_not_sure():
+    found = pair_probabilities(np.ones((2, 2)), np.full(2, 50.0), np.zeros(2))
+    assert_allclose(found, [[0.5, 0.5, 0.0]] * 2, atol=1e-9)
 
 
 @pytest.mark.parametrize("forbidden", [np.inf, np.nan])
 def test_a_forbidden_pair_is_not_assigned(forbidden):
-    matching = match(np.array([[forbidden]]), np.array([9.0]), np.zeros(1))
-    assert matching.partner[0] == -1
+    table = np.array([[forbidden]]), np.array([9.0]), np.zeros(1)
+    assert match(*table).partner[0] == -1
+    assert_allclose(pair_probabilities(*table), [[0.0, 1.0]], atol=1e-300)
 
 
 def test_a_column_that_should_not_stay_unmatched_is_assigned():

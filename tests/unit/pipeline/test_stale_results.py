@@ -18,6 +18,7 @@ from frf_ipz.pipeline import stage_runner
 from frf_ipz.pipeline.inputs import read_inputs
 from frf_ipz.pipeline.stages import measurement, mismatch
 from frf_ipz.runs import software
+from frf_ipz.runs.generations import current_folder
 from small_campaign import write_campaign
 from synthetic_run import synthetic_folder
 
@@ -49,6 +50,20 @@ def test_other_software_computes_anew(campaign, monkeypatch, changed):
     same = software.software()
     monkeypatch.setattr(stage_runner, "software", lambda: {**same, **changed})
     assert ingest_key(campaign) != before
+
+
+def test_a_damaged_result_is_computed_anew_and_the_summary_says_so(campaign):
+    pipeline, out = campaign / "pipeline.toml", campaign / "out"
+    clean = frf_ipz.run_pipeline(pipeline, out, until="fit").summary()
+    assert "mended" not in clean
+    kept = current_folder(out) / "stages" / "fit.result"
+    kept.write_bytes(kept.read_bytes()[:100])
+    (out / "poles.parquet").unlink()
+    said = frf_ipz.run_pipeline(pipeline, out, until="fit").summary().splitlines()
+    notes = [f"{name} was damaged or gone, and has been made again" for name in ("stages/fit.result", "poles.parquet")]
+    place = said.index(f"{'mended':<12}{notes[0]}")
+    assert said[place + 1] == " " * 12 + notes[1]
+    assert "mended" not in frf_ipz.run_pipeline(pipeline, out, until="fit").summary()
 
 
 def test_another_recording_computes_anew(campaign):

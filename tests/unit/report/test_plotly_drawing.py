@@ -208,3 +208,47 @@ def test_every_layer_draws_its_numbers():
     assert (heat["z"].tolist(), heat["zmax"]) == ([[0.0, 2.0]], 2.0)
     (shape,) = drawn["layout"]["shapes"]
     assert (shape["x0"], shape["x1"], shape["fillcolor"]) == (1.0, 2.0, "@muted/0.3")
+
+
+def axis_of(low, high, **axis):
+    line = Line(name="curve", colour=Role.UPDATED, x=np.array([1.0, 2.0, 3.0]), y=np.array([low, np.nan, high]))
+    panel = Panel(y=Axis(title="size", scale="log", **axis), layers=(line,))
+    return draw_picture(Picture(name="one", title="one", alt="one", panels=(panel,)))["layout"]["yaxis"]
+
+
+@pytest.mark.parametrize(("low", "high", "n_ticks"), [(0.2, 2000.0, 12), (2.0, 5.0, 3)])
+def test_sizes_that_people_can_read_are_labelled_20_50_100_200(low, high, n_ticks):
+    axis = axis_of(low, high)
+    assert axis["tickformat"] == ".10~g"
+    assert axis["nticks"] == n_ticks
+    assert "exponentformat" not in axis
+
+
+@pytest.mark.parametrize(("low", "high"), [(1e-7, 1e-3), (1.0, 1e9)])
+def test_others_are_labelled_by_powers_with_their_factors(low, high):
+    axis = axis_of(low, high)
+    assert (axis["exponentformat"], axis["minorloglabels"]) == ("power", "complete")
+    assert "tickformat" not in axis
+
+
+def test_what_an_axis_shows_decides_how_it_is_labelled():
+    assert "tickformat" in axis_of(1e-9, 1e9, limits=(0.1, 100.0))
+
+
+def test_a_map_without_logarithm_is_shaded_by_its_numbers():
+    values = np.array([[0.1, 1.0], [0.5, 0.0]])
+    names = {"columns": ["a", "b"], "rows": ["c", "d"], "texts": [["", ""]] * 2, "scale_title": "MAC"}
+    heat = HeatMap(name="mac", colour=Role.INK, values=values, highest=1.0, is_linear=True, **names)
+    panel = Panel(y=Axis(scale="category"), layers=(heat,))
+    (trace,) = draw_picture(Picture(name="one", title="one", alt="one", panels=(panel,)))["data"]
+    np.testing.assert_array_equal(trace["z"], values)
+    assert (trace["zmin"], trace["zmax"]) == (0, 1.0)
+
+
+def test_pictures_that_the_reader_chooses_among_share_what_one_would_have():
+    x = np.linspace(1.0, 1000.0, 50_000)
+    noise = np.random.default_rng(5).standard_normal((3, len(x)))
+    layers = tuple(Line(name=str(place), colour=place, x=x, y=y) for place, y in enumerate(noise))
+    picture = Picture(name="one", title="one", alt="one", panels=(Panel(y=Axis(), layers=layers),))
+    alone, among_many = (len(draw_picture(picture, n_alike=n)["data"][0]["x"]) for n in (1, 40))
+    assert among_many < 0.3 * alone

@@ -68,6 +68,10 @@ def test_a_file_that_was_deleted_is_written_again(tmp_path):
     with open_run(tmp_path) as folder:
         stage(folder, "a", 1)
     assert (tmp_path / "model.txt").read_text() == "1"
+    assert read_manifest(tmp_path)["notes"] == ["model.txt was damaged or gone, and has been made again"]
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+    assert "notes" not in read_manifest(tmp_path)
 
 
 def test_a_file_that_its_stage_no_longer_writes_goes_and_one_of_another_stage_stays(tmp_path):

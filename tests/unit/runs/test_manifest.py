@@ -33,6 +33,8 @@ def test_a_good_one_is_read_whole(tmp_path):
         ({"name": ["beam"]}, "key 'name'"),
         ({"when": 3}, "key 'when'"),
         ({"packages": []}, "key 'packages'"),
+        ({"notes": "none"}, "key 'notes'"),
+        ({"notes": [1]}, "key 'notes'"),
         ({"packages": {"numpy": 2}}, "key 'packages.numpy'"),
         ({"inputs": {"test.toml": None}}, "key 'inputs.test.toml'"),
         ({"test": "beam"}, "key 'test'"),

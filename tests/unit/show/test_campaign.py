@@ -9,6 +9,8 @@ from starlette.testclient import TestClient
 from frf_ipz.errors import InputError
 from frf_ipz.pipeline.inputs import read_inputs
 from frf_ipz.pipeline.run import run_pipeline
+from frf_ipz.runs.folder import open_run
+from frf_ipz.runs.generations import GENERATIONS, HIDDEN, POINTER
 from frf_ipz.show.app import build_app
 from frf_ipz.show.campaign import find_runs
 from frf_ipz.show.workbench import Workbench
@@ -49,6 +51,18 @@ def test_a_run_is_itself_and_nothing_inside_it_is_looked_at(tmp_path):
     pretend_run(tmp_path / "out" / "stages" / "old", "/elsewhere/pipeline.toml")
     (place,) = find_runs(tmp_path / "out")
     assert (place.folder, str(place.pipeline)) == (tmp_path.resolve() / "out", "/elsewhere/pipeline.toml")
+
+
+def test_a_run_is_what_the_program_reads_whatever_lies_where_users_look(campaign):
+    out = campaign / "results" / "a"
+    with open_run(out) as folder:
+        folder.manifest["pipeline"] = str(campaign / "pipeline.toml")
+    (out / "run.json").unlink()
+    assert [place.folder for place in find_runs(campaign)] == [out]
+    (out / "run.json").write_text("{}", encoding="utf-8")
+    (out / HIDDEN / POINTER).write_text("0\n", encoding="utf-8")  # as while the first results take their place
+    (out / HIDDEN / GENERATIONS / "0").mkdir()
+    assert [place.folder for place in find_runs(campaign)] == [campaign / "results" / "pipeline"]
 
 
 def test_a_pipeline_without_a_run_has_its_results_beside_it(campaign):

@@ -35,6 +35,7 @@ KINDS: tuple[FindCauses, ...] = (
     supports.other_supports,
 )
 MORE_LIKELY_THAN_NOT = 0.5
+NO_MISTAKE = Cause(says="", file="", line_or_key="")
 EXPECTED_COST = 2 * np.log(2)  # of a datum whose error is drawn from Cauchy's distribution: the mean of log(1 + x^2)
 
 
@@ -54,7 +55,7 @@ def find_likely_cause(situation: Situation) -> LikelyCause | None:
     if not len(situation.measured.frequency_hz) or not len(situation.computed.frequency_hz):
         return None
     causes = [cause for kind in KINDS for cause in kind(situation)]
-    nothing = log_evidence(Cause(says="", file="", line_or_key=""), situation)
+    nothing = log_evidence(NO_MISTAKE, situation)
     something_else = unrelated_log_likelihood(situation.measured)
     logs = np.array([nothing, something_else, *(log_evidence(cause, situation) for cause in causes)])
     probability = np.exp(logs - logsumexp(logs))
@@ -63,6 +64,22 @@ def find_likely_cause(situation: Situation) -> LikelyCause | None:
     if not _explains(causes[int(np.argmax(probability[2:]))], situation):
         return None
     return _worded(causes, probability[2:])
+
+
+def agrees(situation: Situation) -> bool:
+    """Tell whether measured and computed modes agree as they stand, as those of a nearly right model do.
+
+    Parameters
+    ----------
+    situation : Situation
+        Measurement and model.
+
+    Returns
+    -------
+    bool
+        True where nothing has to be corrected to make them agree.
+    """
+    return _explains(NO_MISTAKE, situation)
 
 
 def _explains(cause: Cause, situation: Situation) -> bool:

@@ -153,6 +153,9 @@ def wrong_units(situation: Situation) -> Iterator[Cause]:
         for factor, unit in number.units:
             says = f"{number.what} seems to be written in {unit}: multiply it by {factor:g}"
             cause = _scaled(situation, number, factor, says, -float(np.log(count)))
+            if cause.frequency_factor != 1.0:
+                says += f" (all frequencies are off by the common factor {cause.frequency_factor:.4g})"
+                cause = replace(cause, says=says)
             yield cause if not number.dimensions else _rebuilt(cause, situation, number.dimensions, factor)
 
 

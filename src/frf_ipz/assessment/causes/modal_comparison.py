@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import Dof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.identification.peaks import FrfPeaks
     from frf_ipz.modes import ModeSet
 
 # How far a model is off that is nearly right: what lies beyond is worth a cause.
@@ -117,6 +118,30 @@ def measured_modes(fit: ModalFit) -> MeasuredModes:
         deviations=deviations * np.abs(factors),
         labels=fit.labels,
         band_hz=fit.band_hz,
+    )
+
+
+def modes_of_peaks(peaks: FrfPeaks, labels: tuple[FrfLabel, ...]) -> MeasuredModes:
+    """Take the modes out of a first look at FRFs.
+
+    Parameters
+    ----------
+    peaks : FrfPeaks
+        Modes that make a peak.
+    labels : tuple of FrfLabel
+        What each FRF connects.
+
+    Returns
+    -------
+    MeasuredModes
+        Of the band.
+    """
+    return MeasuredModes(
+        frequency_hz=peaks.frequency_hz,
+        products=peaks.products,
+        deviations=peaks.deviations,
+        labels=labels,
+        band_hz=peaks.band_hz,
     )
 
 

@@ -16,11 +16,11 @@ import pandas as pd
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NoModesError
 from frf_ipz.identification.likelihood.compression import response
-from frf_ipz.identification.likelihood.delay import find_delays
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
 from frf_ipz.identification.likelihood.sandwich import pole_variance_factors
 from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms, smooth_terms_of_band
 from frf_ipz.identification.measured_lines import MeasuredLines, measured_lines, with_misfit_noise
+from frf_ipz.identification.search.delays import CommonDelay, common_delay, each_delay
 from frf_ipz.identification.search.drift import Drift
 from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, assess_fit, peak_levels
 from frf_ipz.identification.search.selection import SelectedModes, select_modes
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from frf_ipz.identification.options import FitOptions
 
 FIXED_POLES = 3  # beside the band, while modes are searched
-DELAY_ROUNDS = 2  # of finding delays and poles in turn
 MODEL_ERROR = 1.3  # misfit over noise above which the model, not the noise, limits the fit
 
 
@@ -64,6 +63,8 @@ class FittedModes:
         Poles that were added, dropped, pinned and rejected, with the reason.
     delay_s : (n_frfs,) array
         Delays that were taken off.
+    common_delay : CommonDelay or None
+        The delay that all FRFs share, where there is one and the user asked for no other.
     poles_are_held : bool
         Poles are given and were not fitted.
     """
@@ -79,6 +80,7 @@ class FittedModes:
     start: pd.DataFrame
     decisions: tuple[dict[str, object], ...]
     delay_s: FloatArray
+    common_delay: CommonDelay | None = None
     poles_are_held: bool = False
 
 
@@ -112,12 +114,29 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
     start = find_start_poles(frfs, lines, max_order=options.max_order)
     terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(FIXED_POLES)
     progress(0.2, "adding and dropping poles")
-    delay_s = np.zeros(frfs.n_frfs)
+    noise_is_known = bool(lines.known.all())
+
+    def fit_lines(lines: MeasuredLines, delay_s: FloatArray) -> FittedModes:
+        selected = _select(lines, start.poles, terms, options, noise_is_known=noise_is_known)
+        progress(0.5, "refining")
+        return _refine_with_final_weights(lines, selected, terms, start=start.table, delay_s=delay_s)
+
+    def find_poles(lines: MeasuredLines) -> ComplexArray:
+        complex_modes = replace(options, modes="complex")
+        return _select(lines, start.poles, terms, complex_modes, noise_is_known=noise_is_known).fit.poles
+
     if options.delay:
-        lines, delay_s = _without_delays(frfs, lines, start.poles, terms, options)
-    selected = _select(lines, start.poles, terms, options, noise_is_known=bool(lines.known.all()))
-    progress(0.5, "refining")
-    fitted = _refine_with_final_weights(lines, selected, terms, start=start.table, delay_s=delay_s)
+        delay_s = each_delay(frfs.labels, lines, terms, find_poles)
+        fitted = fit_lines(lines.advanced(delay_s), delay_s)
+    else:
+        fitted = fit_lines(lines, np.zeros(frfs.n_frfs))
+    if options.delay is None:
+        progress(0.52, "looking for a delay that all responses share")
+        weighed = replace(fitted.lines, receptance=lines.receptance, variance=fitted.noise)
+        delay = common_delay(weighed, fitted.fit.poles, terms, find_poles)
+        if delay is not None:
+            delay_s = np.full(frfs.n_frfs, delay.delay_s)
+            fitted = replace(fit_lines(lines.advanced(delay_s), delay_s), common_delay=delay)
     if np.median(fitted.misfit_ratio) > MODEL_ERROR:
         progress(0.55, "adding and dropping poles by the model error")
         fitted = _against_model_error(fitted, options)
@@ -144,6 +163,7 @@ def _against_model_error(fitted: FittedModes, options: FitOptions) -> FittedMode
     degrees_of_freedom = len(squares) - refitted.fit.system.n_linear / 2
     return replace(
         refitted,
+        common_delay=fitted.common_delay,
         lines=replace(refitted.lines, known=fitted.lines.known),
         misfit_ratio=np.sqrt(np.sum(squares / fitted.noise, axis=0) / degrees_of_freedom),
         noise=fitted.noise,
@@ -171,25 +191,6 @@ def _select(
             "look at the FRFs and their coherence, set another [fit] band_hz, or pin a mode with pin_hz"
         )
     return selected
-
-
-def _without_delays(
-    frfs: FrfSet, lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms, options: FitOptions
-) -> tuple[MeasuredLines, FloatArray]:
-    """Find the delay of each channel that makes the modes look normal, and take it off.
-
-    Complex residues follow a short delay almost exactly: they give good poles and no information on the delay.
-    """
-    channels = [label.output_channel or label.output_dof.name for label in frfs.labels]
-    numbers = np.asarray(np.unique(channels, return_inverse=True)[1], np.int64)
-    advanced, delays = lines, np.zeros(frfs.n_frfs)
-    for _ in range(DELAY_ROUNDS):
-        complex_modes = replace(options, modes="complex")
-        poles = _select(advanced, poles, terms, complex_modes, noise_is_known=bool(lines.known.all())).fit.poles
-        data = replace(lines.weighted(shared=True), real_modes=True)
-        delays = find_delays(data, poles, terms, numbers)
-        advanced = replace(lines, receptance=lines.receptance * np.exp(lines.s[:, None] * delays))
-    return advanced, delays
 
 
 def _refine_with_final_weights(

@@ -5,6 +5,9 @@ amplifiers with an undershoot that takes long to recover; hum and drift lie unde
 these in that it pushes the same way for about as long as the first one did. So the force is smoothed over the length of
 the first pulse, which removes faster ringing, and a bump counts only where it stands out from both sides within a few
 lengths, which removes slower motion.
+
+[Halvorsen1977] W. G. Halvorsen, D. L. Brown, Impulse technique for structural frequency response testing, Sound and
+Vibration 11, 1977, 8-21.
 """
 
 from __future__ import annotations
@@ -23,6 +26,8 @@ REACH = 6  # widths within which a bump must stand out from both sides
 SEPARATION = 2  # widths between the first pulse and a bump that is distinct from it
 SIGNIFICANT = 8.0  # standard deviations of the smoothed noise
 ONSET = 0.05  # of the peak
+BAND_LEVEL = 0.1  # of the spectrum's largest modulus, 20 dB below it: the end of a hammer's band [Halvorsen1977]
+PADDING = 8  # lengths of the pulse: its spectrum is then smooth enough to read the end of the band off
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,6 +119,26 @@ def pulse_extent(force: FloatArray, pulse: Pulse, *, significance: float = 4.0) 
     samples_before = _last_before_gap(loud[pulse.peak :: -1], gap)
     samples_after = _last_before_gap(loud[pulse.peak :], gap)
     return pulse.peak - samples_before, pulse.peak + samples_after + 1
+
+
+def force_band(pulse: FloatArray) -> float:
+    """Find up to which frequency a pulse excites.
+
+    Parameters
+    ----------
+    pulse : (n,) array
+        The force from the beginning of a pulse to its end, without its base.
+
+    Returns
+    -------
+    float
+        Where its spectrum first falls 20 dB below its largest value, cycles a sample; 0.5 where it does not.
+    """
+    n_samples = PADDING * max(len(pulse), PADDING)
+    size = np.abs(np.fft.rfft(pulse, n_samples))
+    largest = int(np.argmax(size))
+    below = np.flatnonzero(size[largest:] < BAND_LEVEL * size[largest])
+    return float((largest + below[0]) / n_samples) if below.size else 0.5
 
 
 def _find_bumps(

@@ -10,7 +10,7 @@ from frf_ipz.ingest.signals.clipping import digital_step, is_clipped
 from frf_ipz.ingest.signals.decay import Decay, measure_decay
 from frf_ipz.ingest.signals.faults import find_dropout, find_missing_force, is_settling
 from frf_ipz.ingest.signals.periods import find_period
-from frf_ipz.ingest.signals.pulses import find_pulse, pulse_extent
+from frf_ipz.ingest.signals.pulses import find_pulse, force_band, pulse_extent
 from frf_ipz.ingest.survey.record_info import RecordInfo
 from frf_ipz.ingest.units import si_unit
 from frf_ipz.quantities import RESPONSES
@@ -66,6 +66,7 @@ def check_impact(
     force, responses = signals[1], signals[2:]
     pulse = find_pulse(force, threshold=SECOND_PULSE)
     start, stop = pulse_extent(force, pulse)
+    band_hz = force_band(force[max(start, 0) : stop] - pulse.base) / index.step_s
     if pulse.bumps.size:
         stop = max(stop, int(pulse.bumps.max()) + stop - pulse.peak)
         start = min(start, int(pulse.bumps.min()) + start - pulse.peak)
@@ -91,6 +92,7 @@ def check_impact(
         has_coarse_force=digital_step(force) > 0.0,
         pulse_s=pulse.width * index.step_s,
         force_noise=pulse.noise,
+        force_band_hz=band_hz,
         second_pulse_ratio=float(pulse.ratios.max(initial=0.0)),
         remaining_amplitude=slowest.remaining_amplitude,
         slowest_mode_hz=slowest.frequency_hz,

@@ -40,6 +40,8 @@ class RecordInfo:
         Length of the pulse at half of its height, s; NaN for a shaker's record.
     force_noise : float
         Standard deviation of the force outside of its pulse, N; NaN for a shaker's record.
+    force_band_hz : float
+        Up to where the force's spectrum stays within 20 dB of its largest value, Hz; NaN for a shaker's record.
     second_pulse_ratio : float
         Height of a second pulse over the first; 0 where there is none.
     remaining_amplitude : float
@@ -84,6 +86,7 @@ class RecordInfo:
     has_coarse_force: bool
     pulse_s: float
     force_noise: float
+    force_band_hz: float = float("nan")
     second_pulse_ratio: float = 0.0
     remaining_amplitude: float = 0.0
     slowest_mode_hz: float = 0.0

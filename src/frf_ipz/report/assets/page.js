@@ -16,8 +16,9 @@
     },
   };
   const NO_CLOUD = { displaylogo: false, showSendToCloud: false, plotlyServerURL: "" }; // measurements stay on this machine
-  const PRINT_WIDTH = 680;
-  const PX_A_TICK = 80, DECADES_A_TICK = 0.31; // plotly: labels 1, 2 and 5 of each decade for more than 0.3 decades a tick
+  const PRINT_WIDTH = 680, PRINT_SHARE = 0.8; // of the height on a screen: paper is narrower
+  const PX_A_TICK = { x: 60, y: 26 }, PX_BESIDE = { x: 118, y: 90 }; // of labels; of margins and legend
+  const DECADES_A_TICK = 0.31; // plotly: labels 1, 2 and 5 of each decade for more than 0.3 decades a tick
   const MOST_ROWS_TO_OPEN = 40; // longer tables under pictures are for the screen: on paper they would fill pages
   const decoded = [];
   const drawn = new Map(); // pictures and places by the name of the place, which may hold one of several pictures
@@ -65,6 +66,7 @@
     for (const key of Object.keys(full).filter((name) => /^[xy]axis\d*$/.test(name))) {
       const line = { gridcolor: grid, linecolor: muted, zerolinecolor: grid, tickcolor: muted, automargin: true, showline: true };
       full[key] = { ...line, ticks: "outside", ...full[key] };
+      if (full[key].nticks) full[key].nticks = Math.max(Math.min(full[key].nticks, roomForTicks(key, full[key], element)), 1);
     }
     if ("frequency" in element.dataset) {
       const shown = range || layout.xaxis.range;
@@ -78,8 +80,13 @@
   function mostTicks(ends, figure) {
     const decades = Math.log10(ends[1] / Math.max(ends[0], page.lowestHz));
     if (scale !== "log" || decades < 1) return 0; // its own choice
-    const room = (printing ? PRINT_WIDTH : figure.querySelector(".plot").clientWidth) / PX_A_TICK;
-    return Math.max(Math.floor(Math.min(decades / DECADES_A_TICK, room)), 1);
+    return Math.max(Math.floor(Math.min(decades / DECADES_A_TICK, roomForTicks("xaxis", {}, figure))), 1);
+  }
+
+  function roomForTicks(key, { domain = [0, 1] }, figure) {
+    const plot = figure.querySelector(".plot");
+    const size = key[0] === "y" ? plot.clientHeight : printing ? PRINT_WIDTH : plot.clientWidth;
+    return Math.floor((size - PX_BESIDE[key[0]]) * (domain[1] - domain[0]) / PX_A_TICK[key[0]]);
   }
 
   const choiceIn = (figure) => figure.querySelector("select");
@@ -100,6 +107,8 @@
     const figure = document.getElementById(name);
     const picture = pictureIn(figure);
     const plot = figure.querySelector(".plot");
+    plot.dataset.height ??= parseFloat(plot.style.height);
+    plot.style.height = `${plot.dataset.height * (printing ? PRINT_SHARE : 1)}px`;
     const config = { responsive: !printing, ...NO_CLOUD, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] };
     Plotly.react(plot, traces(picture, drawn.has(name) && plot.data), themed(unpack(picture.layout), figure), config);
     if (!drawn.has(name)) {

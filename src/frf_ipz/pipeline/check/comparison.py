@@ -1,0 +1,131 @@
+"""The FE model beside the peaks of the FRFs: whether the two can be one structure, and what has to be corrected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.assessment.assess import compare_modes
+from frf_ipz.assessment.causes.columns import find_exchanged_columns
+from frf_ipz.assessment.causes.likely_cause import agrees, find_likely_cause
+from frf_ipz.assessment.causes.modal_comparison import FREQUENCY_SCALE, modes_of_peaks
+from frf_ipz.errors import FrfIpzError
+from frf_ipz.identification.peaks import find_peaks
+from frf_ipz.pipeline.check.look import Look
+from frf_ipz.plotting.wording import number
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.assessment.assessment import LikelyCause
+    from frf_ipz.assessment.causes.cause import Situation
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
+    from frf_ipz.pipeline.inputs import PipelineInputs
+
+FREQUENCIES = 8  # that are listed
+FEWEST = 3  # measured frequencies: two have a common factor with some pair of many computed ones by chance
+
+
+def compare_with_model(inputs: PipelineInputs, estimate: FrfEstimate) -> Look:
+    """Set the FE model's modes beside the peaks of the FRFs.
+
+    Parameters
+    ----------
+    inputs : PipelineInputs
+        The set-up.
+    estimate : FrfEstimate
+        Its FRFs.
+
+    Returns
+    -------
+    Look
+        The peaks and the model's frequencies in the same band; what most likely has to be corrected.
+    """
+    files, labels = _Files.of(inputs), estimate.frfs.labels
+    impacts = estimate.traces if inputs.test.kind == "hammer" else ()
+    exchanged = find_exchanged_columns(impacts, labels, test_file=files.test)
+    try:
+        peaks = find_peaks(estimate.frfs, inputs.options.fit)
+    except FrfIpzError as error:
+        return Look(open_points=(*_worded(exchanged), str(error)))
+    if not len(peaks.frequency_hz):
+        return Look(open_points=(*_worded(exchanged), "no peak stands out of the FRFs"))
+    line = f"  peaks     {_listed(peaks.frequency_hz)}"
+    if exchanged is not None or inputs.fe_model is None:
+        return Look(lines=(line,), open_points=tuple(_worded(exchanged)))
+    measured = modes_of_peaks(peaks, labels)
+    situation = compare_modes(measured, inputs.fe_model, test_file=files.test, model_file=files.model)
+    if situation is None:
+        return Look(lines=(line,))
+    beside = f"    model   {_listed(_in_band(situation))}"
+    is_relative = estimate.frfs.unknown_scale != "none"
+    return Look(lines=(line, beside), open_points=tuple(_open_points(situation, is_relative=is_relative)))
+
+
+def _open_points(situation: Situation, *, is_relative: bool) -> list[str]:
+    """Say what has to be corrected; where the scale is unknown, frequencies alone tell."""
+    if is_relative:
+        return _common_factor(situation)
+    cause = find_likely_cause(situation)
+    if cause is not None:
+        return _worded(cause)
+    return [] if agrees(situation) else _disagreement(situation)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Files:
+    """Names of the files that a mistake may stand in."""
+
+    test: str
+    model: str
+
+    @staticmethod
+    def of(inputs: PipelineInputs) -> _Files:
+        return _Files(test=inputs.test.path.name, model=Path(next(iter(inputs.model_names), "FE model")).name)
+
+
+def _worded(cause: LikelyCause | None) -> list[str]:
+    return [] if cause is None else [f"{cause.file}, {cause.line_or_key}: {cause.says}"]
+
+
+def _in_band(situation: Situation) -> FloatArray:
+    """Give the computed frequencies of the measured band; the lowest where none is in it."""
+    low, high = situation.measured.band_hz
+    frequency_hz = situation.computed.frequency_hz
+    inside = frequency_hz[(frequency_hz >= low) & (frequency_hz <= high)]
+    return inside if len(inside) else frequency_hz
+
+
+def _listed(frequency_hz: FloatArray) -> str:
+    more = f" and {len(frequency_hz) - FREQUENCIES} more" if len(frequency_hz) > FREQUENCIES else ""
+    return " ".join(number(hz) for hz in frequency_hz[:FREQUENCIES]) + f" Hz{more}"
+
+
+def _common_factor(situation: Situation) -> list[str]:
+    """Name a factor that brings every measured frequency to a computed one; the model may have more."""
+    measured, computed = situation.measured.frequency_hz, situation.computed.frequency_hz
+    if len(measured) < FEWEST or not len(computed):
+        return []
+    anchors = np.log(measured[0] / computed)  # the lowest measured one is any of the computed
+    errors = np.array([_distances(measured, computed * np.exp(anchor)) for anchor in anchors])
+    best = int(np.argmin(errors.max(axis=1)))
+    if errors[best].max() > FREQUENCY_SCALE or abs(anchors[best]) < FREQUENCY_SCALE:
+        return []
+    return [
+        f"{situation.model_file}: all frequencies of the model are off by the common factor "
+        f"{number(np.exp(anchors[best]))}: look at the units and values of its stiffness, mass and dimensions"
+    ]
+
+
+def _distances(measured: FloatArray, computed: FloatArray) -> FloatArray:
+    """Give the relative distance of each measured frequency to the nearest computed one."""
+    return np.asarray(np.abs(np.log(measured[:, None] / computed)).min(axis=1))
+
+
+def _disagreement(situation: Situation) -> list[str]:
+    return _common_factor(situation) or [
+        f"{situation.model_file}: frequencies and shapes of the model do not agree with the peaks of the FRFs, and no "
+        "single mistake that the program knows explains it: look at material, supports, DOFs of sensors and inputs"
+    ]

@@ -1,0 +1,187 @@
+"""The layout of the page in a real browser: what is chosen, labels of axes, narrow screens, paper, contrasts, axe."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from frf_ipz.report.page import write_report
+from frf_ipz.runs.results import Results
+from opened_page import errors, open_page
+from synthetic_run import synthetic_folder
+
+pytestmark = pytest.mark.browser
+
+PAPER_PX = (688, 986)  # A4 without its margins at 96 pixels an inch
+LEAST_CONTRAST = 4.5  # of text, success criterion 1.4.3 of WCAG 2.2
+PARTICULARS = {"operator": "A. Meier", "date": "2026-11-27", "customer": "Example Machines Ltd"}
+FRAME = """
+const shown = document.documentElement.clientWidth;
+return [...document.querySelectorAll('body *')].filter((e) => {
+  const box = e.getBoundingClientRect();
+  return box.width > 0 && box.right > shown + 1 && !e.closest('.scroll, pre, .main-svg, .skip');
+}).map((e) => e.outerHTML.slice(0, 80));
+"""
+CONTRASTS = """
+const numbers = (text) => text.match(/[\\d.]+/g).slice(0, 3).map(Number);
+const light = (rgb) => {
+  const [r, g, b] = rgb.map((c) => (c /= 255) <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+};
+const behind = (element) => {
+  for (let e = element; e; e = e.parentElement) {
+    const colour = getComputedStyle(e).backgroundColor;
+    if (!/, 0\\)$|transparent|color\\(/.test(colour)) return colour;
+  }
+  return 'rgb(255, 255, 255)';
+};
+const contrast = (ink, paper) => {
+  const [a, b] = [light(numbers(ink)), light(numbers(paper))].sort((x, y) => y - x);
+  return (a + 0.05) / (b + 0.05);
+};
+const paper = getComputedStyle(document.body).backgroundColor;
+const drawn = [...document.querySelectorAll('.main-svg text')]
+  .filter((t) => t.textContent && !t.closest('.bars, .hm, .modebar, .heatmap-label, .heatmaplayer'))
+  .map((t) => ['drawn ' + t.textContent, contrast(getComputedStyle(t).fill, paper)]);
+const tags = "p, td, th, dt, dd, a, h1, h2, h3, li, button, summary, caption, select, footer, figcaption";
+const written = [...document.querySelectorAll(tags)]
+  .filter((e) => e.offsetParent)
+  .map((e) => [e.tagName + " " + e.textContent.slice(0, 30), contrast(getComputedStyle(e).color, behind(e))]);
+return [...drawn, ...written];
+"""
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    path = tmp_path_factory.mktemp("layout") / "report.html"
+    folder = synthetic_folder(diagnosed=True)
+    folder.manifest["test"] = PARTICULARS
+    write_report(Results(folder), path)
+    return path
+
+
+@pytest.fixture
+def page(browser, written):
+    yield open_page(browser, written)
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
+
+
+def resize(page, width, height=900):
+    page.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride",
+        {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False},
+    )
+
+
+def prefer(page, theme):
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]})
+
+
+def test_the_frf_at_the_point_of_interest_is_the_first_picture(page):
+    assert page.find_element("css selector", "figure").get_attribute("id") == "prediction-0"
+    names = page.execute_script("return document.querySelector('#prediction-0 .plot').data.map((t) => t.name)")
+    assert {"90 % band", "measured, kept aside", "nominal model", "updated model"} == set(names)
+
+
+def test_the_frf_that_is_chosen_is_laid_over_its_models(page):
+    shown = "const p = document.querySelector('#overlay .plot'); return [p.data.map((t) => t.name), [...p.data[0].y]]"
+    names, before = page.execute_script(shown)
+    assert names == ["measured", "nominal model", "updated model"] * 2
+    first, second = page.find_elements("css selector", "#overlay option")
+    second.click()
+    title = page.find_element("css selector", "#overlay figcaption").text
+    assert title.startswith(second.text)
+    assert first.text not in title
+    assert second.text in page.find_element("css selector", "#overlay .plot").get_attribute("aria-label")
+    names, after = page.execute_script(shown)
+    assert before != after
+    page.find_element("id", "theme").click()  # draws all anew
+    assert page.execute_script(shown)[1] == after
+    page.find_element("id", "theme").click()
+    assert errors(page) == []
+
+
+@pytest.mark.parametrize("zoom", [None, (12.0, 900.0), (100.0, 160.0)])
+def test_ticks_of_frequency_axes_are_whole_numbers_and_few(page, zoom):
+    if zoom is not None:
+        ends = ", ".join(f"'xaxis.range[{k}]': Math.log10({end})" for k, end in enumerate(zoom))
+        page.execute_script(f"Plotly.relayout(document.querySelector('#frf .plot'), {{{ends}}})")
+    for figure in ("frf", "prediction-0", "overlay"):
+        ticks = page.execute_script(
+            f"return [...document.querySelectorAll('#{figure} .xtick text')].map((t) => t.textContent)"
+        )
+        numbers = [float(text) for text in ticks]
+        assert 2 <= len(numbers) <= 14  # of five digits each at 1180 px
+        assert numbers == sorted(set(numbers))
+        if zoom == (12.0, 900.0):
+            assert numbers == [20, 50, 100, 200, 500]
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_nothing_is_wider_than_a_narrow_screen(browser, written, page, theme):
+    resize(page, 390)
+    prefer(page, theme)
+    open_page(browser, written)
+    assert page.execute_script("return document.documentElement.scrollWidth") <= 390
+    assert page.execute_script(FRAME) == []
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_all_that_is_written_stands_out_from_what_is_behind_it(browser, written, page, theme):
+    prefer(page, theme)
+    open_page(browser, written)
+    contrasts = page.execute_script(CONTRASTS)
+    assert len(contrasts) > 300
+    assert [(text, ratio) for text, ratio in contrasts if ratio < LEAST_CONTRAST] == []
+
+
+def test_printed_pages_bear_the_name_of_the_run_and_their_number(page):
+    rules = page.execute_script(
+        "return [...document.styleSheets[0].cssRules].filter((r) => r instanceof CSSPageRule).map((r) => r.cssText)"
+    )
+    margins = next(rule for rule in rules if "@top-left" in rule)
+    assert '"synthetic <beam>"' in margins
+    assert "counter(page)" in margins
+    assert "counter(pages)" in margins
+
+
+def test_the_summary_fills_the_first_two_printed_pages(page):
+    resize(page, *PAPER_PX)
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    page.execute_script("window.dispatchEvent(new Event('beforeprint'))")
+    start, middle, next_page, end = page.execute_script(
+        "const box = (query) => document.querySelector(query).getBoundingClientRect();"
+        "return [box('.head').top, box('#overview .cards').bottom, box('#overview .cards + *').top,"
+        " box('#overview').bottom]"
+    )
+    breaks = page.execute_script(
+        "return ['#overview', '#overview .cards'].map((q) => getComputedStyle(document.querySelector(q)).breakAfter)"
+    )
+    cuts = page.execute_script(
+        "return [...document.querySelectorAll('figure, .plot, .card')].map((e) => getComputedStyle(e).breakInside)"
+    )
+    page.execute_script("window.dispatchEvent(new Event('afterprint'))")
+    assert middle - start <= PAPER_PX[1]
+    assert end - next_page <= PAPER_PX[1]
+    assert breaks == ["page", "page"]
+    assert set(cuts) == {"avoid"}
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_no_fault(browser, written, page, theme, width):
+    axe = os.environ.get("AXE_CORE", "")
+    if not axe:
+        pytest.skip("needs axe-core: npm pack axe-core, and AXE_CORE=PATH/TO/axe.min.js")
+    resize(page, width)
+    prefer(page, theme)
+    open_page(browser, written)
+    page.execute_script("document.querySelectorAll('details').forEach((list) => { list.open = true; })")
+    page.execute_script(Path(axe).read_text(encoding="utf-8"))
+    page.set_script_timeout(120)
+    faults = page.execute_async_script(
+        "const done = arguments[arguments.length - 1];"
+        "axe.run(document).then((r) => done(r.violations.map((v) => [v.id, v.nodes.map((n) => n.html.slice(0, 120))])))"
+    )
+    assert faults == []
