@@ -157,7 +157,7 @@ def diagnose(
     >>> diagnosis.verdict
     'explained'
     >>> diagnosis.findings[0].statement
-    'A mass of 200 g (+- 0.59 g) sits at node 3 (x = 2.000 m) that the model lacks.'
+    'A mass of 200.0 g (95 %: 198.8 to 201.2) sits at node 3 (x = 2.000 m) that the model lacks (probability above 0.999).'
     """
     require_type("data", data, VibrationTest, FrfSet, Observations)
     require_type("fe_model", fe_model, StructuralModel)
