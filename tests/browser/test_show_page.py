@@ -126,7 +126,8 @@ def test_zooming_in_brings_all_lines_of_the_frfs(page, demo):
         demo / "out" / "frf.parquet", filters=[("frequency_hz", ">", 299.9), ("frequency_hz", "<", 303.1)]
     )
     frequencies = sorted(set(lines["frequency_hz"].to_pylist()))
-    inside = "return [...document.querySelector('#frf .plot').data[0].x].filter((x) => x > 299.9 && x < 303.1).length"
+    curve = "document.querySelector('#frf .plot').data.find((one) => !one.fill)"
+    inside = f"return [...{curve}.x].filter((x) => x > 299.9 && x < 303.1).length"
     page.show("#frf")
     page.run(
         "const plot = document.querySelector('#stabilisation .plot'), isLog = plot.layout.xaxis.type === 'log';"

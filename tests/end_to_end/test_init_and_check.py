@@ -5,13 +5,17 @@ import sys
 
 import numpy as np
 import pytest
+from scipy import sparse
+from scipy.io import mmwrite
 
 from frf_ipz.cli import main as command
 from frf_ipz.errors import InputError
+from frf_ipz.fe.eigen import solve_modes
+from frf_ipz.fe.model_file import read_model
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.pipeline.check.setup import describe_setup
 from frf_ipz.pipeline.config import read_pipeline
-from frf_ipz.pipeline.init import write_starting_files
+from frf_ipz.pipeline.init.starting_files import write_starting_files
 from frf_ipz.pipeline.inputs import read_inputs
 from small_campaign import write_campaign
 
@@ -25,8 +29,12 @@ def campaign(tmp_path):
 def test_init_writes_files_that_can_be_read_as_they_are(campaign):
     for name in ("test.toml", "pipeline.toml"):
         (campaign / name).unlink()
-    written = write_starting_files(campaign)
-    assert all(written.values())
+    written = write_starting_files(campaign).written
+    assert {path.name: is_new for path, is_new in written.items()} == {
+        "test.toml": True,
+        "model.toml": False,
+        "pipeline.toml": True,
+    }
     test = read_test(campaign / "test.toml")
     assert test.input_channel.column == "force"
     assert [channel.column for channel in test.output_channels] == ["acc"]
@@ -36,12 +44,13 @@ def test_init_writes_files_that_can_be_read_as_they_are(campaign):
 
 def test_init_leaves_what_is_there(campaign):
     before = (campaign / "test.toml").read_text()
-    assert not any(write_starting_files(campaign).values())
+    assert not any(write_starting_files(campaign).written.values())
     assert (campaign / "test.toml").read_text() == before
 
 
 def test_init_groups_blows_by_the_name_of_their_files(campaign):
-    (campaign / "test.toml").unlink()
+    for name in ("test.toml", "model.toml"):  # without a model every node is possible
+        (campaign / name).unlink()
     for number, name in enumerate(["p18_01", "p18_02", "p180_01"]):
         (campaign / "hits" / f"blow_{number + 1}.csv").rename(campaign / "hits" / f"{name}.csv")
     write_starting_files(campaign)
@@ -229,6 +238,22 @@ def test_check_names_what_is_wrong_with_the_recordings(campaign, change, says):
     assert re.search(says, open_points(text)[0])
 
 
+@pytest.mark.parametrize(
+    ("file", "change", "says"),
+    [
+        ("test", ('dof = "21:+z"', 'dof = "4:+z"'), "test.toml: the frequencies agree"),
+        ("model", ("length_m = 0.5", "length_m = 0.61"), "model.toml"),
+    ],
+    ids=["shapes", "length"],
+)
+def test_check_says_what_does_not_agree(campaign, file, change, says):
+    """One sensor that is elsewhere could be many things: its unit, its place, the place of the impacts."""
+    rewrite(campaign / f"{file}.toml", change)
+    text = look(campaign)
+    assert FITS not in text
+    assert open_points(text)[0].startswith(says)
+
+
 def test_check_says_that_a_point_of_interest_is_measured(campaign):
     rewrite(campaign / "pipeline.toml", ('points = ["11:+z"]', 'points = ["11:+z", "21:-z"]'))
     (point,) = open_points(look(campaign))
@@ -277,3 +302,151 @@ def test_check_names_a_point_whose_impacts_are_mostly_left_out(campaign):
     edit_recordings(campaign, hit_twice)
     points = open_points(look(campaign))
     assert any(re.match(r"2 of the 3 records at 15:\+z are left out: 3 x double hit", point) for point in points)
+
+
+MATRICES = ("M", "K", "K_root", "M_root")
+
+
+def write_matrices(folder):
+    """Matrices of the campaign's beam, as another FE program exports them, with a part that is named."""
+    model = read_inputs(folder / "pipeline.toml").fe_model
+    rows = "".join(
+        f"{dof.node},{dof.direction},{0.025 * (dof.node - 1)},0,0\n"
+        for dof in model.dofs
+        if dof.direction in {"z", "ry"}
+    )
+    (folder / "dofs.csv").write_text(f"node,direction,x_m,y_m,z_m\n{rows}", encoding="utf-8")
+    part = sparse.diags([1.0] + [0.0] * (len(model.dofs) - 1))
+    for name, matrix in zip(MATRICES, (model.mass, model.stiffness, part, 1e-6 * part), strict=True):
+        mmwrite(folder / f"{name}.mtx", sparse.coo_array(matrix), symmetry="general", precision=17)
+
+
+def test_init_fills_in_a_model_of_matrices(campaign):
+    write_matrices(campaign)
+    nominal = read_inputs(campaign / "pipeline.toml").fe_model
+    for name in ("test", "model", "pipeline"):
+        (campaign / f"{name}.toml").unlink()
+    files = write_starting_files(campaign)
+    assert all(files.written.values())
+    assert files.taken_for == ("K.mtx, M.mtx: matrices of the FE model", "dofs.csv: rows of the matrices")
+    inputs = read_inputs(campaign / "pipeline.toml")
+    assert inputs.fe_model.kind == "matrices"
+    assert [part.name for part in inputs.fe_model.parts] == ["root"]
+    modes = [solve_modes(model, n_modes=3).natural_frequency_hz for model in (nominal, inputs.fe_model)]
+    np.testing.assert_allclose(modes[1], modes[0], rtol=1e-9)
+    assert "Lines that 'init' had to guess" in describe_setup(inputs)
+
+
+def test_places_that_init_guesses_are_free_in_the_model(campaign):
+    """Node 1 is clamped: no sensor can sit there, and check would refuse it."""
+    for name in ("test", "pipeline"):
+        (campaign / f"{name}.toml").unlink()
+    write_starting_files(campaign)
+    assert [str(dof) for dof in read_inputs(campaign / "pipeline.toml").test.output_dofs] == ["2:+z"]
+
+
+def test_init_writes_a_skeleton_of_a_model_that_no_pipeline_names_yet(campaign):
+    for name in ("test", "model", "pipeline"):
+        (campaign / f"{name}.toml").unlink()
+    assert write_starting_files(campaign).written[campaign / "model.toml"]
+    lines = (campaign / "model.toml").read_text(encoding="utf-8").splitlines()
+    assert all(line.startswith("#") for line in lines if line)
+    assert read_inputs(campaign / "pipeline.toml").fe_model is None
+
+
+@pytest.mark.parametrize("kind", ["beam", "lumped"])
+def test_the_skeleton_without_its_comments_is_a_model(campaign, kind):
+    (campaign / "model.toml").unlink()
+    write_starting_files(campaign)
+    path = campaign / "model.toml"
+    lines = [line.removeprefix("# ") for line in path.read_text(encoding="utf-8").splitlines()]
+    kept, is_wanted = [], False
+    for line in lines:
+        header = re.fullmatch(r"\[+(\w+)[\w.]*\]+", line)
+        is_wanted = header[1] in {"model", "damping", kind} if header else is_wanted
+        kept += [line] if is_wanted and (header or re.match(r"\w+ = ", line)) else []
+    path.write_text("\n".join(kept).replace('kind = "beam"', f'kind = "{kind}"'), encoding="utf-8")
+    assert read_model(path).kind == kind
+
+
+def test_init_takes_frfs_beside_recordings_for_a_reference(campaign):
+    (campaign / "kept.csv").write_text(
+        "frequency_hz,output_dof,input_dof,real,imag\n1,11:+z,15:+z,0.1,0.01\n2,11:+z,15:+z,1,0.1\n", encoding="utf-8"
+    )
+    for name in ("test", "pipeline"):
+        (campaign / f"{name}.toml").unlink()
+    assert write_starting_files(campaign).taken_for == ("kept.csv: FRFs kept aside, no recording",)
+    inputs = read_inputs(campaign / "pipeline.toml")
+    assert inputs.reference.labels[0].output_dof == inputs.points[0]
+    assert len(inputs.test.files) == 3
+
+
+def test_init_prints_the_next_step(campaign, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["frf-ipz", "init", str(campaign)])
+    with pytest.raises(SystemExit):
+        command.main()
+    assert capsys.readouterr().out.splitlines()[-1].endswith(f"then run 'frf-ipz check {campaign}'")
+
+
+def columns_of_init(campaign, head, change=lambda table: table):
+    (campaign / "model.toml").unlink()
+    (campaign / "test.toml").unlink()
+    for path in (campaign / "hits").glob("*.csv"):
+        table = change(np.loadtxt(path, delimiter=",", skiprows=1))
+        np.savetxt(path, table, delimiter=",", header=head, comments="", fmt="%.8g")
+    write_starting_files(campaign)
+    test = read_test(campaign / "test.toml")
+    return [(channel.column, channel.quantity) for channel in test.channels]
+
+
+@pytest.mark.parametrize(
+    ("head", "found"),
+    [
+        ("time,F,v_tip", ["force", "velocity"]),
+        ("time,F_1,acc_x", ["force", "acceleration"]),
+        ("time,hammer,laser [mm/s]", ["force", "velocity"]),
+        ("Zeit [s],Kraft,Beschleunigung", ["force", "acceleration"]),
+        ("time [s],in [N],out [um]", ["force", "displacement"]),
+        ("time,force level [m/s^2],ch2 [N]", ["force", "acceleration"]),
+        ("time,Kraft,Weg", ["force", "displacement"]),
+        ("time,ch1,ch2 [g]", ["force", "acceleration"]),
+        ("time,ch1 [m/s^2],ch2", ["force", "acceleration"]),
+    ],
+)
+def test_init_tells_quantities_by_units_else_by_names(campaign, head, found):
+    assert [quantity for _, quantity in columns_of_init(campaign, head)] == found
+
+
+def test_what_units_and_names_tell_is_not_marked(campaign):
+    columns_of_init(campaign, "time [s],force [N],acc [m/s^2]")
+    text = (campaign / "test.toml").read_text(encoding="utf-8")
+    assert not [line for line in text.splitlines() if line.startswith(("quantity", "unit")) and line.endswith("CHECK")]
+    assert "Lines that 'init' had to guess" in look_without_model(campaign)
+
+
+def look_without_model(campaign):
+    (campaign / "pipeline.toml").unlink()
+    write_starting_files(campaign)
+    return look(campaign)
+
+
+def test_a_second_force_is_no_response(campaign):
+    found = columns_of_init(campaign, "time,force_1,acc,force_2", lambda table: np.column_stack([table, table[:, 1]]))
+    assert found == [("force_1", "force"), ("acc", "acceleration")]
+
+
+def test_init_says_where_no_column_can_be_the_force(campaign):
+    with pytest.raises(InputError, match=r"none of the columns is a force: 'a' in mm/s, 'b' in g"):
+        columns_of_init(campaign, "time [s],a [mm/s],b [g]")
+
+
+def test_a_voltage_needs_its_sensitivity(campaign):
+    (campaign / "model.toml").unlink()
+    for path in (campaign / "hits").glob("*.csv"):
+        path.write_text(path.read_text(encoding="utf-8").replace("force", "force [V]"), encoding="utf-8")
+    (campaign / "test.toml").unlink()
+    (campaign / "pipeline.toml").unlink()
+    write_starting_files(campaign)
+    assert re.search(r"# sensitivity = .*needed: the files are in V   CHECK", (campaign / "test.toml").read_text())
+    with pytest.raises(InputError, match="'V' is no unit of force"):
+        look(campaign)

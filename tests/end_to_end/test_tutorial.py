@@ -26,8 +26,8 @@ def correct_settings():
     sensor, pipeline = toml_blocks("campaign")
     test = Path("beam/test.toml")
     text = test.read_text(encoding="utf-8")
-    assert text.count('\ndof = "1:+z" ') == 1
-    text = text.replace('\ndof = "1:+z" ', f"\n{sensor.strip()} ")
+    assert text.count('\ndof = "2:+z" ') == 1
+    text = text.replace('\ndof = "2:+z" ', f"\n{sensor.strip()} ")
     test.write_text("\n".join(line.removesuffix("CHECK") for line in text.splitlines()), encoding="utf-8")
     Path("beam/pipeline.toml").write_text(pipeline, encoding="utf-8")
 

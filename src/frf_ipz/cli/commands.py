@@ -17,7 +17,7 @@ from frf_ipz.visible_text import one_line
 EPILOG = """
 [bold]From a folder of recordings to a controller-ready model[/bold]
 
-  frf-ipz init FOLDER                    writes test.toml and pipeline.toml from the CSVs in FOLDER
+  frf-ipz init FOLDER                    writes test.toml, model.toml and pipeline.toml from FOLDER
   frf-ipz check FOLDER                   validates everything and draws the set-up
   frf-ipz run FOLDER --out RESULTS
   frf-ipz show RESULTS                   opens the results as a page to look at and to work on
@@ -98,13 +98,18 @@ def check(pipeline: PipelineArgument) -> None:
 
 @app.command()
 def init(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder with the recordings as CSV.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Folder with the recordings as CSV, and the matrices of the model.")
+    ],
 ) -> None:
-    """Write commented test.toml and pipeline.toml from a folder of CSVs; what is there already is left alone."""
-    from frf_ipz.pipeline.init import write_starting_files
+    """Write commented test.toml, model.toml and pipeline.toml from a folder of CSVs; what is there is left alone."""
+    from frf_ipz.pipeline.init.starting_files import write_starting_files
 
-    for path, written in write_starting_files(folder).items():
+    files = write_starting_files(folder)
+    for path, written in files.written.items():
         say(one_line(f"{'wrote' if written else 'left '} {path}"))
+    for text in (*files.taken_for, files.next_step):
+        say(one_line(text))
 
 
 @app.command()

@@ -25,6 +25,7 @@ from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.identification.results.gains import find_channel_gains
 from frf_ipz.identification.results.measured_model import measured_model, residue_covariance
+from frf_ipz.identification.results.repeated_roots import with_repeated_roots
 from frf_ipz.identification.results.tables import misfit_table, mode_table
 from frf_ipz.identification.results.zeros import ZerosWithErrors, find_zeros
 from frf_ipz.identification.root_covariance import RootCovariance
@@ -90,7 +91,7 @@ def fit_modes(frfs: FrfSet, *, options: FitOptions | None = None, progress: Prog
         progress(0.7, "fitting each half of the lines")
         halves = fit_halves(frfs, fitted, chosen)
     progress(0.9, "finding zeros and errors")
-    return _as_modal_fit(frfs, fitted, chosen, halves)
+    return with_repeated_roots(_as_modal_fit(frfs, fitted, chosen, halves))
 
 
 def fit_residues(frfs: FrfSet, *, poles: ComplexArray, options: FitOptions | None = None) -> ModalFit:

@@ -191,8 +191,7 @@ def _at(part: Any, points: IntArray) -> Any:  # noqa: ANN401  an array, or a lis
 def _with_common(trace: Trace, layer: Layer, named: set[int], axes: dict[str, str]) -> Trace:
     """Add what all traces have."""
     common: Trace = {"name": _text(layer.name), **{key: name for key, name in axes.items() if name not in {"x", "y"}}}
-    is_second = trace.pop("is_second", False)
-    if is_second or id(layer) not in named:
+    if id(layer) not in named:
         common["showlegend"] = False
     if layer.frf is not None:
         common["meta"] = {"frf": layer.frf}
@@ -296,17 +295,28 @@ def _(layer: Line, panel: Panel) -> list[Trace]:
 def _(layer: Band, panel: Panel) -> list[Trace]:
     del panel
     colour = _colour(layer.colour, layer.opacity)
-    bare = {
-        "type": "scatter",
-        "mode": "lines",
-        "x": layer.x,
-        "line": {"width": 0, "color": colour},
-        "hoverinfo": "skip",
-    }
+    known = np.isfinite(layer.low) & np.isfinite(layer.high)
+    stretches = np.split(np.arange(len(known)), np.flatnonzero(np.diff(known)) + 1)
+    # each stretch there and back; plotly takes what a gap separates for outlines of their own
+    outline = [np.concatenate([rows, rows[::-1]]) for rows in stretches if known[rows].all()]
+    x = [layer.x[rows] for rows in outline]
+    y = [np.where(np.arange(len(rows)) < len(rows) // 2, layer.low[rows], layer.high[rows]) for rows in outline]
     return [
-        {**bare, "y": layer.low, "is_second": True},
-        {**bare, "y": layer.high, "fill": "tonexty", "fillcolor": colour},
+        {
+            "type": "scatter",
+            "mode": "lines",
+            "x": _joined(x),
+            "y": _joined(y),
+            "line": {"width": 0, "color": colour},
+            "fill": "toself",
+            "fillcolor": colour,
+            "hoverinfo": "skip",
+        }
     ]
+
+
+def _joined(parts: Sequence[FloatArray]) -> FloatArray:
+    return np.concatenate([np.append(part, np.nan) for part in parts])[:-1] if parts else np.zeros(0)
 
 
 @_draw.register(Points)

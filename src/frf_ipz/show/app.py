@@ -18,6 +18,7 @@ from starlette.routing import Mount, Route
 from frf_ipz.errors import FrfIpzError, InputError
 from frf_ipz.report.html import PLOTLY, REPORT, read_asset
 from frf_ipz.runs.results import errors_of_results
+from frf_ipz.show.downloads import picture_file
 from frf_ipz.show.guard import Guard
 from frf_ipz.show.list_page import render_list
 from frf_ipz.show.page import SHOW, Addresses, render_choices, render_page
@@ -39,6 +40,7 @@ ASSETS = {
     "plotly.js": (REPORT, PLOTLY, "text/javascript"),
     "page.js": (REPORT, "page.js", "text/javascript"),
     "show.js": (SHOW, "show.js", "text/javascript"),
+    "band_edges.js": (SHOW, "band_edges.js", "text/javascript"),
     "page.css": (REPORT, "page.css", "text/css"),
     "show.css": (SHOW, "show.css", "text/css"),
 }
@@ -93,6 +95,7 @@ class _Routes:
             Route(f"{run}/choices", self._answering(_choices)),
             Route(f"{run}/shape", self._answering(_shape, self._one_at_a_time)),
             Route(f"{run}/zoom", self._answering(_zoom, self._one_at_a_time)),
+            Route(f"{run}/picture/{{name}}", self._answering(_picture, self._one_at_a_time)),
             Route(f"{run}/change", self._answering(_change), methods=["POST"]),
             Route(f"{run}/allow", self._answering(_allow), methods=["POST"]),
             *[
@@ -106,8 +109,8 @@ class _Routes:
 
     def _page(self, bench: Workbench, request: Request) -> Response:
         up = "../" if self._is_campaign else ""
-        report = f"../{up}{self._file_token}/{request.path_params.get('run', '1')}/report.html"
-        return HTMLResponse(render_page(bench, Addresses(home=up, assets=f"{up}assets/", report=report)))
+        files = f"../{up}{self._file_token}/{request.path_params.get('run', '1')}/"
+        return HTMLResponse(render_page(bench, Addresses(home=up, assets=f"{up}assets/", files=files)))
 
     async def _list(self, request: Request) -> Response:
         del request
@@ -201,6 +204,11 @@ def _zoom(bench: Workbench, request: Request) -> Response:
     except ValueError as error:
         raise InputError(str(error)) from None
     return JSONResponse({"traces": zoomed_traces(bench.contents(), range_hz, frfs)})
+
+
+def _picture(bench: Workbench, request: Request) -> Response:
+    content, kind = picture_file(bench.contents(), str(request.path_params["name"]))
+    return Response(content, media_type=kind, headers={"content-disposition": "attachment"})
 
 
 def _change(bench: Workbench, request: Request) -> Response:

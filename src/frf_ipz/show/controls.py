@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from frf_ipz.dofs import Dof
+    from frf_ipz.frf import FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pipeline.config import PipelineFile
     from frf_ipz.runs.results import Results
@@ -109,13 +110,15 @@ def command_line(pipeline: Path, folder: Path) -> str:
     return f"frf-ipz run {quoted[0]} --out {quoted[1]}"
 
 
-def pole_forms(fit: ModalFit) -> Form:
+def pole_forms(fit: ModalFit, frfs: FrfSet | None) -> Form:
     """Let the user pin and reject poles and leave frequency ranges out.
 
     Parameters
     ----------
     fit : ModalFit
         The fit.
+    frfs : FrfSet, optional
+        What was measured: the band can be taken as far as there are lines.
 
     Returns
     -------
@@ -127,7 +130,9 @@ def pole_forms(fit: ModalFit) -> Form:
         {"frequency": number(hertz, 6), "damping": percent(ratio), "hz": f"{hertz:.8g}", "label": number(hertz, 5)}
         for hertz, ratio in zip(natural_frequency_hz(poles), damping_ratio(poles), strict=True)
     ]
-    return Form(template="show/pole_forms.html", data={"modes": modes})
+    lines_hz = fit.band_hz if frfs is None else frfs.frequency_hz[[0, -1]]
+    bands = {"band_hz": [f"{end:.8g}" for end in fit.band_hz], "lines_hz": [f"{end:.8g}" for end in lines_hz]}
+    return Form(template="show/pole_forms.html", data={"modes": modes, **bands})
 
 
 def record_list(run: Results, choices: PipelineFile) -> Form | None:

@@ -18,6 +18,7 @@ from frf_ipz.show.controls import (
     record_list,
     shape_form,
 )
+from frf_ipz.show.downloads import downloads
 from frf_ipz.show.marks import DIAGRAM, STRUCTURE, with_choices, with_retained
 from frf_ipz.show.setup import read_setup
 
@@ -27,9 +28,11 @@ if TYPE_CHECKING:
     from frf_ipz.pipeline.config import PipelineFile
     from frf_ipz.plotting.picture import Picture
     from frf_ipz.runs.results import Results
+    from frf_ipz.show.ghost import Ghost
     from frf_ipz.show.workbench import Workbench
 
 SHOW = "frf_ipz.show"
+EDGES_HINT = "Drag an edge of the band to fit another one; with the keyboard: Tab to it, arrow keys, Enter."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,13 +45,13 @@ class Addresses:
         The list of runs; empty where there is one run only.
     assets : str
         Folder of scripts and styles.
-    report : str
-        The report to send on.
+    files : str
+        The run's folder.
     """
 
     home: str = ""
     assets: str = "assets/"
-    report: str = "report.html"
+    files: str = ""
 
 
 def render_page(bench: Workbench, addresses: Addresses) -> str:
@@ -75,7 +78,8 @@ def render_page(bench: Workbench, addresses: Addresses) -> str:
     choices, _ = _read_choices(bench)
     if stamp:
         run = bench.contents()
-        sections = page_sections(run, choices)
+        sections = [_with_ghost(section, run, bench.ghost()) for section in page_sections(run, choices)]
+        sections += filter(None, [downloads(run, addresses.files)])
     else:
         run, setup = read_setup(bench.pipeline, bench.read)
         sections = [setup if choices is None or not setup.blocks else _pickable(setup, run, choices)]
@@ -152,7 +156,12 @@ def _with_controls(section: Section, run: Results, choices: PipelineFile) -> Sec
     if section.anchor == "stabilization" and run.fit is not None:
         fit = run.fit
         blocks = _redrawn(blocks, DIAGRAM, lambda picture: with_choices(picture, fit, choices.fit))
-        blocks.insert(1, pole_forms(fit))
+        blocks.insert(1, pole_forms(fit, run.frfs))
+    if section.anchor == "frfs" and run.fit is not None:
+        blocks = [
+            replace(block, hint=f"{block.hint} {EDGES_HINT}") if isinstance(block, Figure) else block
+            for block in blocks
+        ]
     if section.anchor == "recordings":
         records = record_list(run, choices)
         blocks += [] if records is None else [records]
@@ -168,6 +177,17 @@ def _pickable(section: Section, run: Results, choices: PipelineFile) -> Section:
     if geometry is not None:
         blocks = _redrawn(blocks, STRUCTURE, lambda picture: with_retained(picture, geometry, retained))
     return replace(section, blocks=(*blocks, dof_forms(run, choices, retained)))
+
+
+def _with_ghost(section: Section, run: Results, ghost: Ghost | None) -> Section:
+    prediction = run.prediction
+    if ghost is None or prediction is None:
+        return section
+    blocks = [
+        replace(block, picture=ghost.behind(block.picture, prediction)) if isinstance(block, Figure) else block
+        for block in section.blocks
+    ]
+    return replace(section, blocks=tuple(blocks))
 
 
 def _redrawn(blocks: Sequence[Block], name: str, change: Callable[[Picture], Picture]) -> list[Block]:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
     from frf_ipz.runs.results import Results
     from frf_ipz.show.campaign import RunPaths
+    from frf_ipz.show.ghost import Ghost
     from frf_ipz.show.worker import Status
 
 STOP_S = 5.0  # how long a run gets to notice that the server ends
@@ -118,6 +119,16 @@ class Workbench:
             If there is no run yet, or a file is damaged.
         """
         return self._opened.results(self.folder, self.stamp)
+
+    def ghost(self) -> Ghost | None:
+        """Give what was predicted before the results that `contents` gives, where they have been looked at.
+
+        Returns
+        -------
+        Ghost or None
+            None where there is nothing to compare with.
+        """
+        return self._opened.ghost(self.folder)
 
     def text(self) -> str:
         """Read the pipeline file.

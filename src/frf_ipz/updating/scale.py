@@ -6,6 +6,10 @@ that of the model plus the logarithms of the gains. Three errors stand against i
 targets leave open, taken from the ensemble, whose members have gains of their own; and what no member expresses, in
 proportion to the mean amplitude of the FRF, whose size follows from the scatter itself ([Paule1982]).
 
+Where the scale is known, the gain common to all FRFs is fitted all the same: it shows by how much the mass of the model
+is in doubt, which poles and zeros do not tell. The model stays as it is (a slip in the units of the test looks alike);
+the draws of a gain of 1 then reach as far as the one that was found.
+
 ``common``: one factor for all FRFs. ``per_channel``: one for every sensor and one for every excitation. Only products
 of the two show, so the sensors' are 1 in the geometric mean: a point without a sensor is seen by such a mean one.
 
@@ -46,13 +50,15 @@ class MeasuredScale:
     kind : str
         ``none``, ``common`` or ``per_channel``, as the test says.
     labels : tuple of FrfLabel
-        The measured FRFs; empty where the scale is known, or no mode is paired, so that no gain can be fitted.
+        The measured FRFs; empty where no mode is paired, so that no gain can be fitted.
     log_gain : (n,) array
         Logarithm of the modulus of each gain: the common one; or the sensors', then the excitations'.
     sign : (n,) array
         1 or -1.
     draws : (m, n) array
         Of the logarithms: one a member of the update's ensemble.
+    level : float
+        Measured FRFs over those of the model in their unit, where the test knows its scale; else 1.
 
     Examples
     --------
@@ -81,6 +87,7 @@ class MeasuredScale:
     log_gain: FloatArray = field(default_factory=lambda: np.zeros(0))
     sign: FloatArray = field(default_factory=lambda: np.zeros(0))
     draws: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    level: float = 1.0
 
     @property
     def is_relative(self) -> bool:
@@ -183,7 +190,7 @@ class MeasuredScale:
         Returns
         -------
         (count,) array
-            Positive; 1 throughout where the scale is known.
+            Positive.
         """
         places = self._places(label)
         if not places:
@@ -217,7 +224,7 @@ class MeasuredScale:
         Returns
         -------
         float
-            dB; 0 where the scale is known.
+            dB; where the scale is known, how far the mass of the model is in doubt.
         """
         drawn = self.drawn(label, len(self.draws)) if len(self.draws) else np.ones(1)
         return float(DECIBEL * np.std(np.log(drawn)))
@@ -302,16 +309,25 @@ def fit_scale(
     Returns
     -------
     MeasuredScale
-        Without gains where the scale is known or no mode is paired.
+        Without gains where no mode is paired; with gains of 1 where the scale is known.
     """
     poles = [place for place, pair in enumerate(pairs.targets) if pair.kind == "pole"]
-    if fit.unknown_scale == "none" or not poles:
+    if not poles:
         return MeasuredScale(kind=fit.unknown_scale)
     modes = np.array([pairs.targets[place].measured for place in poles])
-    measured, noise = (values[modes] for values in measured_amplitudes(fit))
+    known = fit.gain if fit.unknown_scale == "none" else 1.0
+    measured, noise = (values[modes] / np.abs(known) for values in measured_amplitudes(fit))
     computed, spread = _amplitudes(fit.labels, model, np.abs(roots[poles]), ensemble)
     channels = _channels(fit.labels, fit.unknown_scale)
     log_gain, draws = _fit_logs(measured, noise, computed, spread, channels, _independent(fit.labels))
+    if fit.unknown_scale == "none":
+        return MeasuredScale(
+            labels=fit.labels,
+            log_gain=np.zeros(1),
+            sign=np.ones(1),
+            draws=_doubt(float(log_gain[0]), draws),
+            level=float(np.exp(log_gain[0])),
+        )
     sign = _signs(np.sum((measured * computed).real / np.abs(computed).max(axis=0), axis=0), channels)
     log_gain, draws = _balanced(log_gain, draws, fit.labels, fit.unknown_scale)
     return MeasuredScale(kind=fit.unknown_scale, labels=fit.labels, log_gain=log_gain, sign=sign, draws=draws)
@@ -319,7 +335,7 @@ def fit_scale(
 
 def _channels(labels: tuple[FrfLabel, ...], kind: str) -> FloatArray:
     """(n_frfs, n_gains) 1 where an FRF has a gain."""
-    if kind == "common":
+    if kind != "per_channel":
         return np.ones((len(labels), 1))
     columns = []
     for ends in ([_sensor_name(label) for label in labels], [_excitation_name(label) for label in labels]):
@@ -409,6 +425,11 @@ def _unexplained(data: FloatArray, design: FloatArray, known: FloatArray, relati
     while surplus(top) > 0:
         top *= 2.0
     return float(brentq(surplus, floor, top))
+
+
+def _doubt(log_gain: float, draws: FloatArray) -> FloatArray:
+    """Draws about a gain of 1, as far as the one that was found."""
+    return np.asarray(draws - log_gain + log_gain * np.random.default_rng(SEED + 1).standard_normal((len(draws), 1)))
 
 
 def _signs(agreement: FloatArray, channels: FloatArray) -> FloatArray:

@@ -78,7 +78,8 @@ class UpdatedModel(Tabulated, Drawn):
         Change of the stiffness of every part of the FE model, as `along_structure.change_along_structure` gives it;
         empty where the method has not changed parts.
     scale, nominal_scale : MeasuredScale
-        Gains of the measured FRFs over the updated and the nominal model, where the test does not know its scale.
+        Gains of the measured FRFs over the updated and the nominal model, where the test does not know its scale;
+        else gains of 1 whose draws carry the doubt of the model's mass.
 
     Examples
     --------

@@ -1,9 +1,12 @@
 """A first look at FRFs finds the modes that make a peak, their shapes, and nothing where there is only noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import frf_ipz
+from frf_ipz.identification import peaks as peaks_module
 from frf_ipz.identification.peaks import find_peaks
 
 LINES_HZ = np.arange(5.0, 700.0, 0.25)
@@ -50,9 +53,27 @@ def test_noise_makes_no_peak(seed):
     assert not len(find_peaks(frfs, frf_ipz.FitOptions(band_hz=(10.0, 690.0))).frequency_hz)
 
 
-def test_a_band_in_which_no_pole_is_stable_is_searched_for_what_stands_out():
-    """A few lines about one peak: the polyreference method needs more."""
-    frfs = measured(noise=NOISE)
-    first_hz = frf_ipz.solve_modes(BEAM, n_modes=1).natural_frequency_hz[0]
-    peaks = find_peaks(frfs, frf_ipz.FitOptions(band_hz=(first_hz - 3, first_hz + 3)))
-    np.testing.assert_allclose(peaks.frequency_hz, [first_hz], rtol=2e-3)
+def start_with(monkeypatch, change):
+    """Let the polyreference method give other poles than it does."""
+    find = peaks_module.find_start_poles
+
+    def find_other(*arguments, **options):
+        start = find(*arguments, **options)
+        return replace(start, poles=np.sort_complex(change(start.poles)))
+
+    monkeypatch.setattr(peaks_module, "find_start_poles", find_other)
+
+
+def test_a_pole_that_stands_for_noise_is_no_peak(monkeypatch):
+    false = 2 * np.pi * np.array([200.0, 450.0]) * (-0.01 + 1j)
+    start_with(monkeypatch, lambda poles: np.concatenate([poles, false]))
+    peaks = find_peaks(measured(noise=NOISE), frf_ipz.FitOptions(band_hz=(10.0, 690.0)))
+    assert len(peaks.frequency_hz) == 4
+
+
+def test_without_start_poles_what_stands_out_of_the_noise_is_taken(monkeypatch):
+    """As happens in short bands with few lines."""
+    start_with(monkeypatch, lambda poles: poles[:0])
+    peaks = find_peaks(measured(noise=NOISE), frf_ipz.FitOptions(band_hz=(80.0, 120.0)))
+    modes = frf_ipz.solve_modes(BEAM, n_modes=2)
+    np.testing.assert_allclose(peaks.frequency_hz, modes.natural_frequency_hz[1:], rtol=1e-3)

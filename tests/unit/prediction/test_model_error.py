@@ -1,10 +1,13 @@
 """Bands widen by what the updated model misses where it was measured, and hold the truth where it was not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import frf_ipz
 from clamped_beam import BEAM
+from frf_ipz.updating.scale import MeasuredScale
 
 LINES = np.arange(5.0, 700.0, 0.5)
 OUTPUTS, INPUTS, POINT = ("9:+z", "16:+z", "21:+z"), ("12:+z",), "18:+z"
@@ -33,7 +36,8 @@ def predict(machine, *, seed=0):
     reduced = frf_ipz.reduce_model(fit, model, points=[POINT])
     updated = frf_ipz.update_model(fit, reduced, fe_model=model)
     prediction = frf_ipz.predict_frfs(fit, updated, points=[POINT])
-    by_ensemble = frf_ipz.predict_frfs(frfs, updated, points=[POINT], frequency_hz=prediction.frequency_hz)
+    sure_of_mass = replace(updated, scale=MeasuredScale())
+    by_ensemble = frf_ipz.predict_frfs(frfs, sure_of_mass, points=[POINT], frequency_hz=prediction.frequency_hz)
     truth = frf_ipz.compute_frfs(machine, labels([POINT]), 2j * np.pi * prediction.frequency_hz)
     return prediction, by_ensemble, np.abs(truth)
 

@@ -16,7 +16,7 @@ from frf_ipz.show.page import SHOW, Addresses, page_sections
 from hostile_run import HOSTILE, hostile_folder
 
 SCRIPTS_OF_REPORT = 3  # the data, plotly, the page's own
-SCRIPTS_OF_SHOW = 4
+SCRIPTS_OF_SHOW = 5
 
 
 class Reader(HTMLParser):
@@ -64,7 +64,7 @@ def workbench():
         .render(
             **run_values(run, page_sections(run, file)),
             stamp=HOSTILE,
-            addresses=Addresses(home=HOSTILE, assets=HOSTILE, report=HOSTILE),
+            addresses=Addresses(home=HOSTILE, assets=HOSTILE, files=HOSTILE),
             folder=HOSTILE,
             choices=Choices(entries=list_choices(file), command=HOSTILE, text=HOSTILE),
         )

@@ -97,11 +97,13 @@ def test_curves_of_one_x_are_thinned_together_so_that_it_is_stored_once():
     first, second = (Line(name=name, colour=0, x=x, y=y) for name, y in zip("ab", curves, strict=True))
     band = Band(name="band", colour=0, opacity=0.3, x=x, low=curves[0] - 1, high=curves[0] + 1)
     drawn = draw_picture(picture_of(band, first, second))["data"]
-    assert len({trace["x"].tobytes() for trace in drawn}) == 1
-    assert max(drawn[2]["y"]) == curves[0].max()
-    assert min(drawn[3]["y"]) == curves[1].min()
-    lines = np.searchsorted(x, drawn[0]["x"])
-    np.testing.assert_array_equal(drawn[0]["y"], curves[0][lines] - 1)
+    assert len({trace["x"].tobytes() for trace in drawn[1:]}) == 1
+    assert max(drawn[1]["y"]) == curves[0].max()
+    assert min(drawn[2]["y"]) == curves[1].min()
+    n = len(drawn[1]["x"])
+    lines = np.searchsorted(x, drawn[1]["x"])
+    np.testing.assert_array_equal(drawn[0]["x"], [*drawn[1]["x"], *drawn[1]["x"][::-1]])
+    np.testing.assert_array_equal(drawn[0]["y"][:n], curves[0][lines] - 1)
 
 
 def test_points_that_are_no_curve_stay_all():
@@ -252,3 +254,23 @@ def test_pictures_that_the_reader_chooses_among_share_what_one_would_have():
     picture = Picture(name="one", title="one", alt="one", panels=(Panel(y=Axis(), layers=layers),))
     alone, among_many = (len(draw_picture(picture, n_alike=n)["data"][0]["x"]) for n in (1, 40))
     assert among_many < 0.3 * alone
+
+
+def test_a_band_is_not_drawn_where_it_is_not_known():
+    """Not by lines across the gap either, which would close over all of the picture."""
+    x = np.arange(8.0)
+    low, high = x + 1.0, x + 2.0
+    low[3:5] = np.nan
+    (trace,) = draw_picture(
+        Picture(
+            name="band",
+            title="",
+            alt="",
+            panels=(Panel(y=Axis(), layers=(Band(name="b", colour=0, x=x, low=low, high=high),)),),
+            x=Axis(),
+        )
+    )["data"]
+    assert trace["fill"] == "toself"
+    nan = np.nan
+    np.testing.assert_array_equal(trace["x"], [0, 1, 2, 2, 1, 0, nan, 5, 6, 7, 7, 6, 5])
+    np.testing.assert_array_equal(trace["y"], [1, 2, 3, 4, 3, 2, nan, 6, 7, 8, 9, 8, 7])

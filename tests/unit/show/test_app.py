@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import re
+from gzip import decompress as gunzip
 
 import pytest
 from starlette.testclient import TestClient
@@ -227,7 +228,8 @@ def test_what_lies_in_the_folder_has_no_origin_and_runs_the_scripts_of_reports_o
         assert is_shown or headers["content-type"] == "application/octet-stream"
     report = (bench.folder / "report.html").read_text(encoding="utf-8")
     digests = set(re.findall(r"sha256-([\w+/=]+)", policy))
-    scripts = re.findall(r"<script>(.*?)</script>", report, re.DOTALL)
+    packed = re.search(r'<script[^>]* id="library"[^>]*>(.*?)</script>', report, re.DOTALL)[1]
+    scripts = [*re.findall(r"<script>(.*?)</script>", report, re.DOTALL), gunzip(base64.b64decode(packed)).decode()]
     assert digests == {base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts}
 
 

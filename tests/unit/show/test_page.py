@@ -93,8 +93,12 @@ def test_a_run_that_ended_early_has_the_forms_it_can_have(without, missing):
     assert {form for form in forms if f'id="{form}"' not in html} == missing
 
 
+def picture_of(run, name, choices=None):
+    return next(picture for picture, _ in pictures_of(page_sections(run, choices)) if picture.name == name)
+
+
 def test_choices_and_handles_are_drawn_into_the_diagram(run):
-    diagram = next(picture for picture in pictures_of(page_sections(run, None)) if picture.name == "stabilisation")
+    diagram = picture_of(run, "stabilisation")
     marked = with_choices(diagram, run.fit, CHOICES.fit)
     layers = {layer.name: layer for layer in marked.layers}
     assert layers["pinned"].x.tolist() == [20.0, 33.0]
@@ -116,12 +120,12 @@ def test_without_a_pipeline_file_there_is_the_report_alone(run):
 
 
 def test_nodes_that_the_model_is_reduced_to_are_ringed(run):
-    drawing = next(picture for picture in pictures_of(page_sections(run, None)) if picture.name == "structure")
+    drawing = picture_of(run, "structure")
     ringed = with_retained(drawing, run.geometry, run.reduced_model.dofs)
     rings = ringed.layers[-1]
     nodes = next(layer for layer in drawing.layers if layer.name == "nodes")
     for dof, x in zip(run.reduced_model.dofs, rings.x, strict=True):
         assert x == nodes.x[nodes.texts.index(f"node {dof.node}")]
     assert list(rings.texts) == [dof.name for dof in run.reduced_model.dofs]
-    names = [layer.name for layer in pictures_of(page_sections(run, CHOICES))[0].layers]
+    names = [layer.name for layer in picture_of(run, "structure", CHOICES).layers]
     assert "retained in the reduction" in names

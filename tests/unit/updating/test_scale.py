@@ -131,13 +131,17 @@ def test_another_unit_of_the_measurement_changes_the_unit_of_the_prediction_only
     np.testing.assert_allclose(other.prediction.magnitude_high, 1e-3 * common.prediction.magnitude_high, rtol=1e-3)
 
 
-def test_a_known_scale_has_no_gains(common):
-    known = replace(common.fit, unknown_scale="none")
-    updated = common.updated
+@pytest.mark.parametrize("factor", [1.0, 1.3])
+def test_a_known_scale_has_gains_of_one_and_tells_how_far_the_mass_is_in_doubt(common, factor):
+    residues = common.fit.model.residues / common.gains[0] * factor
+    known = replace(common.fit, unknown_scale="none", model=replace(common.fit.model, residues=residues))
+    updated, label = common.updated, common.fit.labels[0]
     scale = fit_scale(known, common.pairs, updated.model, updated.after, updated.ensemble)
     assert not scale.is_relative
-    assert scale.gain(common.fit.labels[0]) == 1.0
-    assert (scale.drawn(common.fit.labels[0], 3) == 1.0).all()
+    assert (scale.gain(label), scale.statement) == (1.0, "")
+    assert scale.level == pytest.approx(factor, rel=0.01)
+    drawn = np.log(scale.drawn(label, 200))
+    assert np.sqrt(np.mean(drawn**2)) == pytest.approx(np.log(factor), rel=0.15, abs=0.01)  # of 200 draws
 
 
 def test_the_band_carries_the_deviation_of_the_gain(common):

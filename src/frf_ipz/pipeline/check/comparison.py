@@ -125,7 +125,15 @@ def _distances(measured: FloatArray, computed: FloatArray) -> FloatArray:
 
 
 def _disagreement(situation: Situation) -> list[str]:
-    return _common_factor(situation) or [
+    factor = _common_factor(situation)
+    if factor:
+        return factor
+    if _distances(situation.measured.frequency_hz, situation.computed.frequency_hz).max() < FREQUENCY_SCALE:
+        return [
+            f"{situation.test_file}: the frequencies agree with the model's, the shapes at the measured points do not, "
+            "and no single mistake that is known explains it: look at DOFs, signs and units of sensors and inputs"
+        ]
+    return [
         f"{situation.model_file}: frequencies and shapes of the model do not agree with the peaks of the FRFs, and no "
         "single mistake that the program knows explains it: look at material, supports, DOFs of sensors and inputs"
     ]

@@ -58,5 +58,5 @@ def is_marked(line: str) -> bool:
 
 
 def _without_mark(line: str) -> str:
-    key, _, comment = line.strip().removesuffix(MARK).partition("  #")
+    key, _, comment = line.strip().removesuffix(MARK).partition(" # ")
     return f"{key.strip()}  ({comment.strip()})" if comment.strip() else key.strip()

@@ -34,6 +34,7 @@
       follow();
     } catch (error) {
       complain(error.message);
+      document.dispatchEvent(new Event("frf-ipz-refused"));
     }
   }
 
@@ -74,6 +75,7 @@
 
   async function settled(state) {
     complain(state.error);
+    document.dispatchEvent(new Event("frf-ipz-refused")); // or cancelled: nothing has changed
     showChoices((await ask("choices")).choices);
   }
 
@@ -378,5 +380,6 @@
     follow();
   }
 
+  window.workbench = { whenDrawn, change };
   start();
 })();

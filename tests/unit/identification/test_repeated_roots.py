@@ -1,0 +1,77 @@
+"""Two modes at one frequency are told by the rank of their residues."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from frf_ipz.identification.fit import fit_modes
+from frf_ipz.identification.options import FitOptions
+from frf_ipz.identification.results.shapes import mode_shapes
+from synthetic_frfs import Modes, accelerances, frf_set, random_modes
+
+LINES_HZ = np.arange(40, 401) * 0.5
+SHAPES = np.array([[1.0, 0.2, -0.7, 0.4], [-0.3, 1.0, 0.5, 0.6], [0.5, -0.6, 0.4, 1.0]]).T
+SEED = 3_930
+
+
+def two_at(distance_hz, *, n_inputs=2):
+    frequency_hz = np.array([80.0, 80.0 + distance_hz, 150.0])
+    return Modes(frequency_hz, np.full(3, 0.01), SHAPES, SHAPES[:n_inputs])
+
+
+def fit_of(truth, *, noise=1e-3, known=True):
+    frfs = accelerances(truth, LINES_HZ, noise=noise, seed=SEED)
+    return frfs, fit_modes(frfs if known else frf_set(LINES_HZ, frfs.values, frfs.labels), options=FitOptions())
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("distance_hz", [0.0, 0.05])
+def test_two_modes_at_one_frequency(distance_hz, known):
+    truth = two_at(distance_hz)
+    frfs, fit = fit_of(truth, known=known)
+    assert fit.n_modes == 3
+    np.testing.assert_allclose(fit.modes["frequency_hz"], truth.frequency_hz, rtol=1e-4, atol=0)
+    assert ("share the frequency" in " ".join(fit.warnings)) == (distance_hz == 0)
+    used = fit.used_lines
+    error = np.abs(fit.model(frfs.s[used]) - frfs.values[used]) / np.sqrt(frfs.variance[used])
+    assert np.sqrt(np.mean(error**2)) < 1.05
+
+
+def test_their_shapes_span_those_of_the_truth():
+    _, fit = fit_of(two_at(0.0))
+    shapes = mode_shapes(fit).shapes[:, :2]
+    assert np.abs(shapes.imag).max() < 0.02 * np.abs(shapes).max()
+    # what any rotation of the two leaves is the sum of their products
+    np.testing.assert_allclose(shapes @ shapes.T, SHAPES[:, :2] @ SHAPES[:, :2].T, rtol=0, atol=0.01)
+
+
+def test_their_covariance_is_that_of_two_estimates():
+    _, fit = fit_of(two_at(0.0))
+    pair = fit.covariance[np.ix_(range(4), range(4))]
+    alone = fit_of(two_at(0.0, n_inputs=1))[1].covariance
+    assert np.linalg.eigvalsh(pair).min() > 0
+    mean = (pair[:2, :2] + pair[2:, 2:] + pair[:2, 2:] + pair[2:, :2]) / 4
+    np.testing.assert_allclose(pair[:2, :2], 2 * mean, rtol=1e-6, atol=0)
+    assert np.trace(mean) < np.trace(alone[:2, :2])  # two inputs say more than one
+    assert fit.covariance.shape == (2 * (3 + len(fit.zeros.values)),) * 2
+
+
+def test_one_input_does_not_tell():
+    _, fit = fit_of(two_at(0.0, n_inputs=1))
+    assert fit.n_modes == 2
+
+
+def test_modes_of_rank_one_stay_one():
+    for seed in range(5):
+        truth = random_modes([60.0, 110.0, 160.0], 0.01, n_outputs=5, n_inputs=3, seed=seed)
+        fit = fit_modes(accelerances(truth, LINES_HZ, noise=3e-3, seed=seed), options=FitOptions())
+        assert fit.n_modes == 3
+
+
+def test_shapes_that_differ_by_the_mounting_are_no_second_mode():
+    truth = random_modes([60.0, 110.0, 160.0], 0.01, n_outputs=5, n_inputs=3, seed=SEED)
+    frfs = accelerances(truth, LINES_HZ, noise=1e-4, seed=SEED)
+    gains = 1 + 0.05 * np.random.default_rng(SEED).standard_normal(frfs.n_frfs)
+    fit = fit_modes(replace(frfs, values=frfs.values * gains), options=FitOptions())
+    assert fit.n_modes == 3

@@ -1,0 +1,32 @@
+"""Bands hold the truth where the model lacks a mode, hangs otherwise, or has another mass."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import frf_ipz
+from frf_ipz.updating.scale import MeasuredScale
+from hidden_effects import HiddenRun
+
+KINDS = ("cords", "lump", "mass")
+
+
+def share_inside_by_ensemble(run, updated):
+    """Share of the lines that the band holds without what the model misses at the measured points."""
+    point, lines = [run.hidden.point], run.prediction.frequency_hz
+    prediction = frf_ipz.predict_frfs(run.frfs, updated, points=point, frequency_hz=lines)
+    return np.mean((run.truth >= prediction.magnitude_low) & (run.truth <= prediction.magnitude_high))
+
+
+def test_a_band_reaches_as_far_as_the_mass_is_in_doubt():
+    run = HiddenRun("mass", 4000)
+    assert abs(np.log(run.updated.scale.level)) > 0.05
+    assert share_inside_by_ensemble(run, run.updated) > 0.8
+    assert share_inside_by_ensemble(run, replace(run.updated, scale=MeasuredScale())) < 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [*KINDS, "local modes"])
+def test_bands_hold_the_truth_over_many_machines(kind):
+    assert np.mean([HiddenRun(kind, 5000 + seed).share_inside for seed in range(30)]) > 0.85
