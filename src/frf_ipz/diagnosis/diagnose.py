@@ -156,8 +156,8 @@ def diagnose(
     >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
     >>> diagnosis.verdict
     'explained'
-    >>> diagnosis.findings[0].statement
-    'A mass of 200.0 g (95 %: 198.8 to 201.2) sits at node 3 (x = 2.000 m) that the model lacks (probability above 0.999).'
+    >>> diagnosis.findings[0].parameters["mass_kg"].in_words("g", 1e3), diagnosis.findings[0].confidence
+    ('200.0 g (95 %: 198.8 to 201.2)', 'probability above 0.999')
     """
     require_type("data", data, VibrationTest, FrfSet, Observations)
     require_type("fe_model", fe_model, StructuralModel)
