@@ -3,6 +3,7 @@ from .assessment.assessment import Assessment as Assessment
 from .assessment.assessment import Check as Check
 from .assessment.assessment import LikelyCause as LikelyCause
 from .assessment.assessment import Verdict as Verdict
+from .assessment.deviations import FrfDeviation as FrfDeviation
 from .diagnosis.apply import correct_frfs as correct_frfs
 from .diagnosis.apply import correct_model as correct_model
 from .diagnosis.catalogue.effect import Effect as Effect
@@ -86,6 +87,7 @@ from .pairing.pair import pair_roots as pair_roots
 from .pairing.pairs import Pair as Pair
 from .pairing.pairs import Pairs as Pairs
 from .pairing.pairs import PairVerdict as PairVerdict
+from .pairing.pairs import RootCount as RootCount
 from .pipeline.campaign import Campaign as Campaign
 from .pipeline.run import run_pipeline as run_pipeline
 from .prediction.agreement import Agreement as Agreement

@@ -68,7 +68,8 @@ def assess(evidence: Evidence) -> Assessment:
         test_file=evidence.test_file,
         model_file=evidence.model_file,
     )
-    return Assessment.of_checks(checks, cause)
+    deviations = tuple(found for found in (evidence.point_deviation, evidence.deviation) if found is not None)
+    return Assessment.of_checks(checks, cause, deviations=deviations)
 
 
 def likely_cause(

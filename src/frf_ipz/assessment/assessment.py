@@ -7,6 +7,7 @@ from enum import Enum
 
 import numpy as np
 
+from frf_ipz.assessment.deviations import FrfDeviation
 from frf_ipz.display import Tabulated
 
 
@@ -120,6 +121,8 @@ class Assessment(Tabulated):
         The worst first.
     likely_cause : LikelyCause, optional
         What most likely has to be corrected; None where no mistake is more likely than not.
+    deviations : tuple of FrfDeviation
+        How far the models are from what was measured, at the points of interest first, where something was.
 
     Examples
     --------
@@ -132,6 +135,7 @@ class Assessment(Tabulated):
     verdict: Verdict
     checks: tuple[Check, ...]
     likely_cause: LikelyCause | None = None
+    deviations: tuple[FrfDeviation, ...] = ()
 
     def __repr__(self) -> str:
         costly = [check.name for check in self.costly]
@@ -143,7 +147,13 @@ class Assessment(Tabulated):
         return tuple(check for check in self.checks if check.verdict is not Verdict.USABLE)
 
     @classmethod
-    def of_checks(cls, checks: list[Check], likely_cause: LikelyCause | None = None) -> Assessment:
+    def of_checks(
+        cls,
+        checks: list[Check],
+        likely_cause: LikelyCause | None = None,
+        *,
+        deviations: tuple[FrfDeviation, ...] = (),
+    ) -> Assessment:
         """Draw the verdict from checks.
 
         Parameters
@@ -152,6 +162,8 @@ class Assessment(Tabulated):
             In any order.
         likely_cause : LikelyCause, optional
             What most likely has to be corrected: with it, a result is used with care at best.
+        deviations : tuple of FrfDeviation
+            How far the models are from what was measured.
 
         Returns
         -------
@@ -161,7 +173,7 @@ class Assessment(Tabulated):
         order = sorted(checks, key=lambda check: -check.verdict.severity)
         least = Verdict.USABLE if likely_cause is None else Verdict.WITH_CARE
         verdict = max([least, *(check.verdict for check in checks)], key=lambda verdict: verdict.severity)
-        return cls(verdict=verdict, checks=tuple(order), likely_cause=likely_cause)
+        return cls(verdict=verdict, checks=tuple(order), likely_cause=likely_cause, deviations=deviations)
 
     def to_json(self) -> dict[str, object]:
         """Give what stands in `run.json`: plain values, null for what is not a number.
@@ -169,7 +181,7 @@ class Assessment(Tabulated):
         Returns
         -------
         dict
-            ``verdict, checks, likely_cause``.
+            ``verdict, checks, likely_cause, deviations``.
         """
         checks = [
             {
@@ -181,7 +193,12 @@ class Assessment(Tabulated):
             for check in self.checks
         ]
         cause = None if self.likely_cause is None else asdict(self.likely_cause)
-        return {"verdict": self.verdict.value, "checks": checks, "likely_cause": cause}
+        return {
+            "verdict": self.verdict.value,
+            "checks": checks,
+            "likely_cause": cause,
+            "deviations": [deviation.to_json() for deviation in self.deviations],
+        }
 
 
 def _number(value: float) -> float | None:

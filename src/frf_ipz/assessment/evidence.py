@@ -1,4 +1,4 @@
-"""What a run is assessed by: its results side by side, and the models' FRFs at the measured points."""
+"""What a run is assessed by: its results side by side."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.fe.response import compute_frfs
+from frf_ipz.assessment.deviations import measured_deviation, point_deviation
+from frf_ipz.assessment.measured_points import MeasuredPoints
 from frf_ipz.prediction.predict import band_of_magnitudes
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.assessment.deviations import FrfDeviation
     from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.frf import FrfSet
-    from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import Trace
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.prediction.prediction import Prediction
-    from frf_ipz.structure import ReducedModel, StructuralModel
-    from frf_ipz.updating.updated_model import UpdatedModel
+    from frf_ipz.structure import StructuralModel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Evidence:
+class Evidence(MeasuredPoints):
     """The results of a run that its assessment rests on.
 
     Parameters
@@ -47,6 +47,8 @@ class Evidence:
         What the FE model left out; None where it was not looked for.
     is_corrected : bool
         What the diagnosis found is in the model that predicts.
+    with_causes : Prediction, optional
+        Of a model that has what the diagnosis found.
     impacts : tuple of Trace
         Forces and responses of a hammer's impacts; empty for other tests.
     is_recorded : bool
@@ -55,68 +57,30 @@ class Evidence:
         Where a mistake would stand.
     """
 
-    frfs: FrfSet
-    fit: ModalFit
     fe_model: StructuralModel
     pairs: Pairs
-    updated_model: UpdatedModel
     prediction: Prediction
     reference: FrfSet | None = None
     diagnosis: Diagnosis | None = None
     is_corrected: bool = False
+    with_causes: Prediction | None = None
     impacts: tuple[Trace, ...] = ()
     is_recorded: bool = False
     test_file: str = "test.toml"
     model_file: str = "model.toml"
 
     @cached_property
-    def lines(self) -> IntArray:
-        """Lines that were fitted."""
-        return np.flatnonzero(self.fit.used_lines)
+    def deviation(self) -> FrfDeviation | None:
+        """How far the models are from the measured FRFs; None where nothing stands above the noise."""
+        return measured_deviation(self)
 
     @cached_property
-    def measured(self) -> ComplexArray:
-        """(n_lines, n_frfs) measured FRFs on these lines, without the delay that was fitted."""
-        late = np.exp(self.frfs.s[self.lines, None] * self.fit.model.delay_s)
-        return np.asarray(self.frfs.values[self.lines] * late)
-
-    @cached_property
-    def noise(self) -> FloatArray:
-        """(n_lines, n_frfs) standard deviation of the measured FRFs, of the complex value's modulus.
-
-        Where the recordings do not tell, what the fit leaves over stands in for it.
-        """
-        stated = np.sqrt(self.frfs.variance[self.lines])
-        left_over = np.abs(self.frfs.values[self.lines] - self.fit.model(self.frfs.s[self.lines]))
-        known = np.isfinite(stated)
-        return np.where(known, np.where(known, stated, 0.0), np.sqrt(np.mean(left_over**2, axis=0)))
-
-    @cached_property
-    def is_heard(self) -> np.ndarray:
-        """(n_lines, n_frfs) bool array: where an FRF stands above its noise."""
-        return np.abs(self.measured) > self.noise
-
-    @property
-    def is_relative(self) -> bool:
-        """Tell whether the scale of the FRFs is unknown, so that gains are fitted."""
-        return self.frfs.unknown_scale != "none"
-
-    @cached_property
-    def updated(self) -> ComplexArray:
-        """(n_lines, n_frfs) FRFs of the updated model at the measured points, in the unit of the measurement."""
-        return self._values(self.updated_model.model)
-
-    @cached_property
-    def nominal(self) -> ComplexArray:
-        """(n_lines, n_frfs) FRFs of the model before updating at the measured points."""
-        return self._values(self.updated_model.nominal)
+    def point_deviation(self) -> FrfDeviation | None:
+        """The same at the points of interest; None where nothing was measured there."""
+        return point_deviation(self.prediction, frfs=self.frfs, reference=self.reference, with_causes=self.with_causes)
 
     @cached_property
     def band(self) -> tuple[FloatArray, FloatArray]:
         """90 % band of the updated model's magnitudes at the measured points, two (n_lines, n_frfs) arrays."""
         s = np.asarray(2j * np.pi * self.frfs.frequency_hz[self.lines], np.complex128)
         return band_of_magnitudes(self.fit, self.updated_model, self.frfs.labels, s)
-
-    def _values(self, model: ReducedModel) -> ComplexArray:
-        values = compute_frfs(model, self.frfs.labels, self.frfs.s[self.lines])
-        return values * self.updated_model.scale_of(model).gains(self.frfs.labels)

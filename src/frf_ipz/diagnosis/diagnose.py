@@ -29,7 +29,7 @@ from frf_ipz.diagnosis.nonlinear.search import MIN_LOG_BAYES_FACTOR as LAW_NATS
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.observations import Observations, observe
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.result import Ambiguity, Diagnosis
+from frf_ipz.diagnosis.result import Ambiguity, Diagnosis, as_appearance
 from frf_ipz.diagnosis.search.component_search import fit_null_model
 from frf_ipz.diagnosis.verdict.data_checks import list_warnings, run_data_checks
 from frf_ipz.diagnosis.verdict.decision import (
@@ -42,7 +42,7 @@ from frf_ipz.diagnosis.verdict.decision import (
     fit_without_component,
     log_bayes_factor,
 )
-from frf_ipz.diagnosis.verdict.findings import describe_component, make_finding, rank_effects
+from frf_ipz.diagnosis.verdict.findings import describe_component, make_finding, probability_of_need, rank_effects
 from frf_ipz.diagnosis.verdict.identifiability import find_best_sensor, find_detectable_sizes
 from frf_ipz.diagnosis.verdict.law_and_linear import search_beside_law, search_beside_linear
 from frf_ipz.diagnosis.verdict.mismatch import describe_mismatch, localise_mismatch
@@ -83,6 +83,7 @@ AMBIGUOUS = 5.0  # log Bayes factor: effects nearer to the best than that are no
 MAX_ALTERNATIVES = 6
 # What was not looked at, where the time was over before that step was done
 NO_TIME_FOR_LAWS = "all force laws at all locations"
+DISAGREEING = "weak and strong records disagree"
 NO_TIME_BESIDE_LAW = "a linear effect beside a force law"
 NOT_WITH_STATED_DAMPING = "effects that would explain the damping"
 NOT_UNNAMED = "forces that are not in the catalogue"
@@ -155,8 +156,8 @@ def diagnose(
     >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
     >>> diagnosis.verdict
     'explained'
-    >>> diagnosis.findings[0].statement
-    'A mass of 200 g (+- 0.59 g) sits at node 3 (x = 2.000 m) that the model lacks.'
+    >>> diagnosis.findings[0].parameters["mass_kg"].in_words("g", 1e3), diagnosis.findings[0].confidence
+    ('200.0 g (95 %: 198.8 to 201.2)', 'probability above 0.999')
     """
     require_type("data", data, VibrationTest, FrfSet, Observations)
     require_type("fe_model", fe_model, StructuralModel)
@@ -260,6 +261,7 @@ def _diagnose(
     damping = describe_damping(decision.final, options) if decision.final.explains_nearly_all else ""
     linear = replace(
         linear,
+        findings=_appearing(linear.findings) if found.shortfall else linear.findings,
         statements=(damping,) if damping else (),
         unexplained_part=found.shortfall,
         not_searched=decision.not_searched,
@@ -275,9 +277,10 @@ def _diagnose(
         return replace(
             linear,
             verdict=UNEXPLAINED,
+            findings=linear.findings if linear.unexplained_part else _appearing(linear.findings),
             not_searched=NO_TIME_FOR_LAWS,
             statement=f"Weak and strong records disagree. Stopped before all was tried: {NO_TIME_FOR_LAWS}.",
-            unexplained_part="weak and strong records disagree",
+            unexplained_part=DISAGREEING,
         )
     if is_clearly_nonlinear or not effects or decision.verdict == UNEXPLAINED:
         pose_with_observations = partial(_pose_with_observations, model, options, effects, scale)
@@ -459,12 +462,20 @@ def _diagnose_nonlinear(
     if beside is not None:
         law, component = beside
         diagnosis = _add_law(linear, law)
+        (component,) = (component,) if diagnosis.is_explained else _appearing((component,))
         findings = tuple(sorted((*diagnosis.findings, component), key=lambda finding: -finding.log_evidence_gain))
         return replace(diagnosis, findings=findings, statement=f"{diagnosis.statement} {component.statement}")
     diagnosis = _add_law(linear, laws)
     if laws.verdict != UNEXPLAINED or diagnosis.findings or not linear.findings:
         return diagnosis
-    return replace(linear, verdict=UNEXPLAINED, statement=f"{laws.statement} {linear.statement}")
+    appearing = linear.findings if linear.unexplained_part else _appearing(linear.findings)
+    return replace(
+        linear,
+        verdict=UNEXPLAINED,
+        findings=appearing,
+        statement=" ".join([laws.statement, *(finding.statement for finding in appearing)]),
+        unexplained_part=linear.unexplained_part or DISAGREEING,
+    )
 
 
 def _prefer_proven_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
@@ -484,7 +495,7 @@ def _add_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     return replace(
         linear,
         verdict=laws.verdict,
-        findings=findings[:n_findings],
+        findings=findings[:n_findings] if laws.verdict == EXPLAINED else _appearing(findings[:n_findings]),
         alternatives=findings[n_findings:],
         before=before,
         updated=updated,
@@ -494,7 +505,7 @@ def _add_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
         statement=laws.statement if linearised is None else f"{laws.statement} {linearised.statement}",
         linearised_law=linearised,
         law_in_time=None if linearised is None else laws.law_in_time,
-        unexplained_part="",
+        unexplained_part=DISAGREEING if laws.verdict == UNEXPLAINED else "",
     )
 
 
@@ -531,12 +542,13 @@ def _make_findings(
         describe_component(
             decision.final,
             number,
-            newest.probability,
-            log_bayes_factor(decision.final, fit_without_component(problem, decision.final, number)),
+            min(newest.probability, probability_of_need(gain, scale)),
+            gain,
             scale,
             location_set=(dict(components[number].location.entries),),
         )
         for number in range(len(components) - 1)
+        for gain in [log_bayes_factor(decision.final, fit_without_component(problem, decision.final, number))]
     ]
     return tuple(sorted((*older, newest), key=lambda finding: -finding.log_evidence_gain))
 
@@ -586,6 +598,11 @@ def _write_statement(diagnosis: Diagnosis, decision: Decision, *, is_searched: b
     return " ".join(filter(None, sentences))
 
 
+def _appearing(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """Say of findings what they look like: where something remains that nothing explains, they are no facts."""
+    return tuple(replace(finding, statement=as_appearance(finding.statement)) for finding in findings)
+
+
 def _judge(diagnosis: Diagnosis, decision: Decision, found: str, *, is_searched: bool) -> str:
     """Say what the verdict means: a part that is found where something remains unexplained is no fact."""
     if diagnosis.verdict == CONSISTENT:
@@ -602,7 +619,7 @@ def _judge(diagnosis: Diagnosis, decision: Decision, found: str, *, is_searched:
         if found:
             return f"{found} With that and the measured damping, the model explains the measurement."
         return "With the measured damping, the model explains the measurement."
-    partly = f" A part of it looks like this: {found}" if found else ""
+    partly = f" {found}" if found else ""
     return f"Something is missing that nothing in the catalogue explains: {diagnosis.unexplained_part}.{partly}"
 
 

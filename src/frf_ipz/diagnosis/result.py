@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -54,6 +55,61 @@ class Estimate:
     std: float
     low: float
     high: float
+
+    def in_words(self, unit: str = "", scale: float = 1.0, *, less: float = 0.0) -> str:
+        """Write the number with its 95 % interval, to the digits that the latter supports.
+
+        Parameters
+        ----------
+        unit : str
+            Stands behind the number.
+        scale : float
+            From the unit of the parameter to that one; may be negative.
+        less : float
+            Taken off before, in the unit of the parameter.
+
+        Returns
+        -------
+        str
+            The number alone where the interval is not known.
+
+        Examples
+        --------
+        >>> import frf_ipz
+        >>> frf_ipz.Estimate(value=0.001515, std=6.3e-05, low=0.001397, high=0.001644).in_words("g", 1e3)
+        '1.52 g (95 %: 1.40 to 1.64)'
+        >>> frf_ipz.Estimate(value=0.624, std=0.014, low=0.598, high=0.652).in_words("%", -100, less=1)
+        '38 % (95 %: 35 to 40)'
+        """
+        value, *ends = (scale * (number - less) for number in (self.value, self.low, self.high))
+        low, high = sorted(ends)
+        behind = f" {unit}" if unit else ""
+        if not (math.isfinite(low) and math.isfinite(high) and high > low):
+            return f"{_rounded(value, _last_digit(value, 0.0))}{behind}"
+        last = _last_digit(value, (high - low) / (2 * NORMAL_95))
+        return f"{_rounded(value, last)}{behind} (95 %: {_rounded(low, last)} to {_rounded(high, last)})"
+
+
+NORMAL_95 = 1.96  # standard deviations
+MOST_DIGITS = 6  # of a number whose deviation is tiny
+FEWEST_DIGITS = 4  # of a number whose deviation is not known
+
+
+def _last_digit(value: float, std: float) -> int:
+    """Give the power of ten of the last digit that is worth writing."""
+    size = math.floor(math.log10(abs(value))) if value else 0
+    if not std > 0:
+        return size - FEWEST_DIGITS + 1
+    return max(math.floor(math.log10(std)), size - MOST_DIGITS + 1)
+
+
+def _rounded(value: float, last: int) -> str:
+    rounded = round(value, -last) + 0.0  # no negative zero
+    if rounded and not 1e-3 <= abs(rounded) < 1e5:
+        size = math.floor(math.log10(abs(rounded)))
+        mantissa, exponent = f"{rounded:.{max(size - last, 0)}e}".split("e")
+        return f"{mantissa}e{int(exponent)}"
+    return f"{rounded:.{max(-last, 0)}f}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,6 +173,84 @@ class Finding:
     is_significant: bool = True
     key: tuple[object, ...] = ()
     values: tuple[float, ...] = ()
+
+    @property
+    def confidence(self) -> str:
+        """Its probability in words."""
+        return confidence(self.probability)
+
+
+SURE = 0.999  # a probability above is written as being above; below its complement, as being below
+
+
+def confidence(probability: float) -> str:
+    """Write a probability as people read it.
+
+    Parameters
+    ----------
+    probability : float
+        From 0 to 1.
+
+    Returns
+    -------
+    str
+        No row of nines, and none of zeros.
+
+    Examples
+    --------
+    >>> confidence(0.99999), confidence(0.842), confidence(1e-12)
+    ('probability above 0.999', 'probability 0.84', 'probability below 0.001')
+    """
+    if probability > SURE:
+        return f"probability above {SURE}"
+    return f"probability {probability:.2g}" if probability >= 1 - SURE else f"probability below {1 - SURE:.3f}"
+
+
+def with_confidence(statement: str, probability: float) -> str:
+    """Add to a statement how probable it is.
+
+    Parameters
+    ----------
+    statement : str
+        A sentence.
+    probability : float
+        From 0 to 1.
+
+    Returns
+    -------
+    str
+        A sentence.
+
+    Examples
+    --------
+    >>> with_confidence("A mass sits at node 3.", 0.97)
+    'A mass sits at node 3 (probability 0.97).'
+    """
+    return f"{statement.removesuffix('.')} ({confidence(probability)})."
+
+
+def as_appearance(statement: str) -> str:
+    """Turn a statement into what it only looks like, where something remains that nothing explains.
+
+    Parameters
+    ----------
+    statement : str
+        Of a finding.
+
+    Returns
+    -------
+    str
+        A sentence.
+
+    Examples
+    --------
+    >>> as_appearance("A mass sits at node 3 (probability 0.97).")
+    'A part of it looks like this, and need not be: a mass sits at node 3 (probability 0.97).'
+    """
+    return f"{APPEARANCE}{statement[:1].lower()}{statement[1:]}"
+
+
+APPEARANCE = "A part of it looks like this, and need not be: "
 
 
 def describe_location_set(locations: Sequence[Mapping[str, object]]) -> str:
@@ -435,7 +569,7 @@ class Diagnosis(Tabulated, Drawn):
     statement : str
         The verdict in a few sentences.
     unexplained_part : str
-        What nothing explains, in words without a full stop; empty if nothing remains, and beside a force law.
+        What nothing explains, in words without a full stop; empty if nothing remains.
     curves : Curves, optional
         FRFs to draw.
     numbers : mapping of str to float
@@ -504,6 +638,12 @@ class Diagnosis(Tabulated, Drawn):
     def is_complete(self) -> bool:
         """False where the time did not suffice for the whole search."""
         return not self.not_searched
+
+    @property
+    def is_explained(self) -> bool:
+        """True where nothing remains that the findings and the measured damping do not explain."""
+        is_damping_only = bool(self.statements) and not self.unexplained_part
+        return self.verdict != "unexplained" or is_damping_only
 
     def __repr__(self) -> str:
         effects = ", ".join(finding.effect for finding in self.findings) or "no finding"

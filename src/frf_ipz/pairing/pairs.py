@@ -94,6 +94,50 @@ class Pair:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RootCount:
+    """How many measured poles or zeros the model has.
+
+    Parameters
+    ----------
+    kind : str
+        ``pole`` or ``zero``.
+    paired, missing, undecided : int
+        With a counterpart in the model; without one; and those of which the measurement does not tell: not
+        identifiable, real, or with two counterparts that are as likely.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.RootCount(kind="zero", paired=5, missing=1, undecided=4).text
+    '5 of 10 measured zeros have a counterpart in the model, 1 is missing in it, 4 are undecided'
+    """
+
+    kind: str
+    paired: int
+    missing: int
+    undecided: int
+
+    @property
+    def measured(self) -> int:
+        """All that were measured."""
+        return self.paired + self.missing + self.undecided
+
+    @property
+    def share(self) -> float:
+        """Those with a counterpart, of all that were decided; 1 where none was."""
+        decided = self.paired + self.missing
+        return self.paired / decided if decided else 1.0
+
+    @property
+    def text(self) -> str:
+        """The count in words."""
+        words = [f"{self.paired} of {self.measured} measured {self.kind}s have a counterpart in the model"]
+        words += [f"{self.missing} {'is' if self.missing == 1 else 'are'} missing in it"] if self.missing else []
+        words += [f"{self.undecided} {'is' if self.undecided == 1 else 'are'} undecided"] if self.undecided else []
+        return ", ".join(words)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Pairs(Tabulated, Drawn):
     """All poles and zeros of measurement and model.
 
@@ -132,12 +176,24 @@ class Pairs(Tabulated, Drawn):
     warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        counts = []
-        for kind in ("pole", "zero"):
-            measured = [row for row in self.rows if row.kind == kind and row.measured >= 0]
-            paired = sum(row.verdict is PairVerdict.PAIRED for row in measured)
-            counts.append(f"{paired} of {len(measured)} measured {kind}s")
-        return f"Pairs: {', '.join(counts)} have a counterpart in the model"
+        return f"Pairs: {self.count('pole').text}; {self.count('zero').text}"
+
+    def count(self, kind: str) -> RootCount:
+        """Count the measured poles or zeros by what pairing has found.
+
+        Parameters
+        ----------
+        kind : str
+            ``pole`` or ``zero``.
+
+        Returns
+        -------
+        RootCount
+            The one count of summary, page and checks.
+        """
+        verdicts = [row.verdict for row in self.rows if row.kind == kind and row.measured >= 0]
+        paired, missing = (verdicts.count(verdict) for verdict in (PairVerdict.PAIRED, PairVerdict.MISSING_IN_MODEL))
+        return RootCount(kind=kind, paired=paired, missing=missing, undecided=len(verdicts) - paired - missing)
 
     @property
     def targets(self) -> tuple[Pair, ...]:

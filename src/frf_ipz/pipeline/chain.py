@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.pipeline.stage_runner import StageRunner
-from frf_ipz.pipeline.stages import hints, measurement, mismatch, modelling, outputs
+from frf_ipz.pipeline.stages import causes, hints, measurement, mismatch, modelling, outputs
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -77,6 +77,7 @@ def chain(
             updated = modelling.update(runner, model, reduced, fit, pairs, corrected_by=diagnosis)
             yield "update"
             prediction = outputs.predict(runner, updated, fit, frfs)
+            with_causes = None if found is None else causes.predict_with_causes(runner, model, frfs, found, prediction)
             outputs.assess(
                 runner,
                 frfs,
@@ -87,6 +88,7 @@ def chain(
                 updated,
                 prediction,
                 diagnosis=found if diagnosis is None else diagnosis,
+                with_causes=with_causes,
             )
         yield "predict"
         outputs.export(runner, updated, fit, corrected_by=diagnosis)

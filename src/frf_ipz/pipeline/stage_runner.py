@@ -31,7 +31,8 @@ NEEDS = {
     "pair": ("fit", "reduce"),
     "update": ("pair",),
     "predict": ("update",),
-    "assess": ("predict", "diagnose", "reference"),
+    "causes": ("predict", "diagnose", "reference"),
+    "assess": ("predict", "diagnose", "reference", "causes"),
     "export": ("update",),
 }
 
@@ -184,7 +185,7 @@ def dependents(name: str) -> list[str]:
     Examples
     --------
     >>> dependents("update")
-    ['predict', 'assess', 'export']
+    ['predict', 'causes', 'assess', 'export']
     """
     stale = {name}
     for stage, needs in NEEDS.items():

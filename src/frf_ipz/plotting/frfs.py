@@ -86,10 +86,15 @@ def describe_frfs(
         f"{number(high)} Hz on logarithmic magnitude axes.",
         panels=tuple(panels),
         x=frequency_axis(*band_hz),
-        note=("The band is ±1.96 standard deviations from the scatter between records. " if has_band else NO_VARIANCE)
+        note=(f"The band is ±1.96 standard deviations {_variance_source(frfs)}. " if has_band else NO_VARIANCE)
         + ("Shaded: the band that is fitted. " if spans else ""),
         height_px=620,
     )
+
+
+def _variance_source(frfs: FrfSet) -> str:
+    """Say where the variance comes from: one record has no scatter, and neither have FRFs from elsewhere."""
+    return "from the scatter between records" if (frfs.averages > 1).any() else "as stated with the FRFs"
 
 
 def _magnitude_limits(frfs: FrfSet, band_hz: tuple[float, float]) -> tuple[float, float] | None:

@@ -156,7 +156,7 @@ def mismatch_nodes(diagnosis: Diagnosis | None, frfs: FrfSet | None) -> dict[int
     dict of int to str
         What is known of each node.
     """
-    if diagnosis is None or diagnosis.verdict != "unexplained":
+    if diagnosis is None or diagnosis.is_explained:
         return {}
     text = "location of the mismatch: the cause is unknown"
     return dict.fromkeys(_nodes_of(diagnosis.mismatch_location, frfs), text)

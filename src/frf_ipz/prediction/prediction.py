@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.frf import FrfLabel
@@ -74,6 +76,21 @@ class Prediction(Tabulated, Drawn):
         if len(self.frequency_hz):
             lines += f" from {self.frequency_hz[0]:g} to {self.frequency_hz[-1]:g} Hz"
         return f"Prediction: {', '.join(map(str, self.labels))} on {lines}"
+
+    @property
+    def half_width_db(self) -> FloatArray:
+        """(n_frfs,) half width of the 90 % band, the median over its lines, dB; NaN where the method gives none."""
+        with np.errstate(divide="ignore", invalid="ignore"):  # a band may reach down to nothing, or be unknown
+            ratios = self.magnitude_high / self.magnitude_low
+        widths = np.full(len(self.labels), np.nan)
+        is_known = np.isfinite(ratios).any(axis=0)
+        widths[is_known] = 10 * np.log10(np.nanmedian(ratios[:, is_known], axis=0))
+        return widths
+
+    @property
+    def band_text(self) -> str:
+        """The band of its lines, in words."""
+        return f"{self.frequency_hz[0]:.4g} to {self.frequency_hz[-1]:.4g} Hz" if len(self.frequency_hz) else "no line"
 
     def __post_init__(self) -> None:
         shape = (len(self.frequency_hz), len(self.labels))

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from frf_ipz.diagnosis.result import confidence
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -14,6 +16,7 @@ ROUNDED = re.compile(r"\b\d(?:\.\d+)?e\+0[1-5]\b")  # rounded to few digits, and
 SENTENCES = {
     "consistent": "Nothing significant is missing from the model.",
     "unexplained": "Something is missing from the model that nothing in the catalogue explains.",
+    "damping": "With the measured damping, the model explains the measurement.",
     "explained": "What is missing from the model has been found.",
 }
 
@@ -34,11 +37,11 @@ def verdict_of(diagnosis: Diagnosis) -> tuple[str, str]:
     statements = [typeset(finding.statement) for finding in diagnosis.findings if finding.statement]
     if diagnosis.verdict == "explained" and statements:
         return statements[0], " ".join(statements[1:])
-    if diagnosis.verdict == "unexplained" and diagnosis.statements and not diagnosis.unexplained_part:
-        sentence, *rest = statements or ["With the measured damping, the model explains the measurement."]
+    if diagnosis.verdict == "unexplained" and diagnosis.is_explained:  # with the measured damping
+        sentence, *rest = statements or [SENTENCES["damping"]]
         return sentence, " ".join([*rest, *map(typeset, diagnosis.statements)])
     additions = [f"What is not explained: {typeset(diagnosis.unexplained_part)}."] if diagnosis.unexplained_part else []
-    additions += [f"A part of it looks like this: {' '.join(statements)}"] if statements else []
+    additions += statements
     return SENTENCES.get(diagnosis.verdict, ""), " ".join([*additions, *mismatch_sentence(diagnosis)])
 
 
@@ -55,7 +58,7 @@ def mismatch_sentence(diagnosis: Diagnosis) -> list[str]:
     list of str
         A sentence; empty where no location is known.
     """
-    if diagnosis.verdict != "unexplained" or not diagnosis.mismatch_location:
+    if diagnosis.is_explained or not diagnosis.mismatch_location:
         return []
     named = [f"{key.removesuffix('s')} {items}" for key, items in _in_words(diagnosis.mismatch_location)]
     return [f"An unknown force at {' and '.join(named)} would explain most of the mismatch."]
@@ -90,18 +93,18 @@ def card_texts(diagnosis: Diagnosis) -> tuple[str, str]:
     pair of str
         What, and how sure.
     """
-    if not diagnosis.findings:
-        verdict = diagnosis.verdict
-        return (
-            ("nothing", "within the stated tolerances") if verdict == "consistent" else ("unknown", SENTENCES[verdict])
-        )
     effects = [finding.effect.replace("_", " ") for finding in diagnosis.findings]
     counts = {effect: effects.count(effect) for effect in effects}
     names = " and ".join(effect if count == 1 else f"{effect} ({count})" for effect, count in counts.items())
-    if diagnosis.verdict == "unexplained" and (diagnosis.unexplained_part or not diagnosis.statements):
-        return "unknown", f"nothing in the catalogue explains it; best in part: {names}"
-    probability = min(finding.probability for finding in diagnosis.findings)
-    return names, f"probability {probability:.3g}" if probability < 0.999 else "probability above 0.999"
+    if not diagnosis.is_explained:
+        part = f"; a part looks like {names}" if names else ""
+        return "unknown", f"nothing in the catalogue explains it{part}"
+    if not names:
+        return (
+            "nothing",
+            "but damping, which is as measured" if diagnosis.statements else "within the stated tolerances",
+        )
+    return names, confidence(min(finding.probability for finding in diagnosis.findings))
 
 
 def _in_words(location: Mapping[str, object]) -> list[tuple[str, str]]:

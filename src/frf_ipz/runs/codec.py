@@ -37,6 +37,7 @@ RESULTS = {  # by stage: the whole list of what is ever built from a file, with 
     "update": "frf_ipz.updating.updated_model:UpdatedModel",
     "predict": "frf_ipz.prediction.prediction:Prediction",
     "reference": "frf_ipz.frf:FrfSet",
+    "causes": "frf_ipz.prediction.prediction:Prediction",
     "assess": "frf_ipz.assessment.assessment:Assessment",
     "export": "frf_ipz.export.state_space:StateSpaceModel",
 }

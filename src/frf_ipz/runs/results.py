@@ -268,6 +268,11 @@ class Results:
         return self._load("predict")  # type: ignore[no-any-return]
 
     @cached_property
+    def with_causes(self) -> Prediction | None:
+        """FRFs at the points of interest of a model that has what the diagnosis found, where they can be judged."""
+        return None if "causes" in self.stale else self._load("causes")
+
+    @cached_property
     def reference(self) -> FrfSet | None:
         """Measured FRFs at points of interest that were kept aside."""
         return self._load("reference")  # type: ignore[no-any-return]

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.rational import natural_frequency_hz
+from frf_ipz.runs.figures import coherence_text, deviation_of
 from frf_ipz.visible_text import one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from frf_ipz.assessment.assessment import Assessment
     from frf_ipz.diagnosis.result import Diagnosis
@@ -26,6 +26,18 @@ if TYPE_CHECKING:
 
 MOST_MODES = 12
 MOST_CHECKS = 3  # on the first screen; the others are on the page
+MOST_NOTES = 3  # likewise
+MOST_PREDICTIONS = 3  # likewise, those with the widest bands
+NOTE = "  note"
+SECTIONS = {  # of the page, in which a stage's notes stand
+    "ingest": "Records",
+    "fit": "Poles and zeros",
+    "diagnose": "Diagnosis",
+    "pair": "Pairing",
+    "update": "Updating",
+    "predict": "Points of interest",
+    "export": "State space",
+}
 
 
 def summarise(results: Results) -> str:
@@ -42,9 +54,8 @@ def summarise(results: Results) -> str:
         At most a screen of text.
     """
     writers: dict[str, tuple[object, Callable[[Any], list[tuple[str, str]]]]] = {
-        "ingest": (results.estimate, estimate_lines),
+        "ingest": (results.estimate, lambda estimate: estimate_lines(estimate, coherence=coherence_text(results))),
         "fit": (results.fit, fit_lines),
-        "diagnose": (results.diagnosis, diagnosis_lines),
         "reduce": (results.reduced_model, reduced_lines),
         "pair": (results.pairs, pairs_lines),
         "update": (results.updated_model, update_lines),
@@ -54,17 +65,74 @@ def summarise(results: Results) -> str:
     lines = [results.name]
     if results.assessment is not None:
         lines += [f"{title:<12}{text}" for title, text in assessment_lines(results.assessment)]
+    lines += [f"{title:<12}{text}" for title, text in deviation_lines(results)]
+    notes: dict[str, list[str]] = {}
+    if results.diagnosis is not None:
+        lines += _lines_of("diagnose", diagnosis_lines(results.diagnosis), notes, results)
     for stage, (result, write) in writers.items():
         if result is not None:
-            stale = " (stale: made before the last change; run it again)" if stage in results.stale else ""
-            lines += [f"{title:<12}{text}{stale}" for title, text in write(result)]
-    notes = results.manifest.get("notes", [])
-    lines += [f"{'' if place else 'mended':<12}{note}" for place, note in enumerate(notes)]
+            lines += _lines_of(stage, write(result), notes, results)
+    has_page = results.path is not None and "report" in results.stages and "report" not in results.stale
+    lines += [f"{title:<12}{text}" for title, text in note_lines(notes, has_page=has_page)]
+    mended = results.manifest.get("notes", [])
+    lines += [f"{'' if place else 'mended':<12}{note}" for place, note in enumerate(mended)]
     seconds = sum(entry.get("seconds", 0.0) for entry in results.manifest.get("stages", {}).values())
     lines.append(f"{'results':<12}{results.path or 'in memory'}  ({seconds:.1f} s of computing)")
-    if results.path is not None and "report" in results.stages and "report" not in results.stale:
+    if results.path is not None and has_page:
         lines.append(f"{'page':<12}{results.path / 'report.html'}")
     return "\n".join(map(one_line, lines))
+
+
+def _lines_of(stage: str, texts: list[tuple[str, str]], notes: dict[str, list[str]], results: Results) -> list[str]:
+    """Give the lines of a stage, and put its notes aside."""
+    stale = " (stale: made before the last change; run it again)" if stage in results.stale else ""
+    notes[stage] = [text + stale for title, text in texts if title == NOTE]
+    return [f"{title:<12}{text}{stale}" for title, text in texts if title != NOTE]
+
+
+def note_lines(notes: Mapping[str, Sequence[str]], *, has_page: bool) -> list[tuple[str, str]]:
+    """Choose the notes of the first screen: one of each stage before a second one, and where the others stand.
+
+    Parameters
+    ----------
+    notes : mapping of str to sequence of str
+        Of each stage.
+    has_page : bool
+        There is a page that has them all.
+
+    Returns
+    -------
+    list of pairs of str
+        Title and text of each line.
+    """
+    ranked = sorted((place, stage) for stage, texts in notes.items() for place in range(len(texts)))
+    in_order = {stage: number for number, stage in enumerate(notes)}
+    ranked.sort(key=lambda entry: (entry[0], in_order[entry[1]]))
+    shown, rest = ranked[:MOST_NOTES], [stage for _, stage in ranked[MOST_NOTES:]]
+    lines = [(NOTE, notes[stage][place]) for place, stage in shown]
+    if rest:
+        where = ", ".join(f"{rest.count(stage)} under {SECTIONS[stage]}" for stage in dict.fromkeys(rest))
+        lines.append(("", f"and {len(rest)} more notes {'on the page' if has_page else 'in the report'}: {where}"))
+    return lines
+
+
+def deviation_lines(results: Results) -> list[tuple[str, str]]:
+    """Say how far the models are from what was measured, at a point of interest where something was.
+
+    Parameters
+    ----------
+    results : Results
+        The run.
+
+    Returns
+    -------
+    list of pairs of str
+        Title and text of each line.
+    """
+    deviation = deviation_of(results)
+    if deviation is None:
+        return []
+    return [("error", f"{deviation.figures} (median of {deviation.where}; {deviation.described})")]
 
 
 def assessment_lines(assessment: Assessment) -> list[tuple[str, str]]:
@@ -93,13 +161,15 @@ def assessment_lines(assessment: Assessment) -> list[tuple[str, str]]:
     return lines
 
 
-def estimate_lines(estimate: FrfEstimate) -> list[tuple[str, str]]:
+def estimate_lines(estimate: FrfEstimate, *, coherence: str = "") -> list[tuple[str, str]]:
     """Sum up recordings and FRFs.
 
     Parameters
     ----------
     estimate : FrfEstimate
         The result of ingest.
+    coherence : str
+        How coherent the FRFs are, in words.
 
     Returns
     -------
@@ -109,14 +179,11 @@ def estimate_lines(estimate: FrfEstimate) -> list[tuple[str, str]]:
     records, frfs = estimate.records, estimate.frfs
     lines = []
     if len(records):
-        left_out = records[~records["used"].astype(bool)]
-        text = f"{len(records)} records, {len(records) - len(left_out)} used"
-        lines.append(("recordings", text))
-        lines += [("", f"left out: {row.record} ({row.marks})") for row in left_out.itertuples()]
-    coherence = frfs.coherence[np.isfinite(frfs.coherence)]
-    quality = f", median coherence {np.median(coherence):.4f}" if coherence.size else ""
-    span = f"{frfs.n_frfs} FRFs, {frfs.frequency_hz[0]:g} to {frfs.frequency_hz[-1]:g} Hz{quality}"
-    return [*lines, ("FRFs", span), *_warnings(estimate.warnings)]
+        used = int(records["used"].astype(bool).sum())
+        lines.append(("recordings", f"{len(records)} records, {used} used"))
+    span = f"{frfs.n_frfs} FRFs, {frfs.frequency_hz[0]:g} to {frfs.frequency_hz[-1]:g} Hz"
+    span += f", coherence {coherence}" if coherence else ""
+    return [*lines, ("FRFs", span), *_notes(estimate.warnings)]
 
 
 def fit_lines(fit: ModalFit) -> list[tuple[str, str]]:
@@ -139,7 +206,7 @@ def fit_lines(fit: ModalFit) -> list[tuple[str, str]]:
     return [
         ("fit", f"{fit.n_modes} modes: {values}{rest} Hz"),
         ("", f"{zeros} zeros with a number, {len(fit.zeros.values) - zeros} not identifiable"),
-        *_warnings(fit.warnings),
+        *_notes(fit.warnings),
     ]
 
 
@@ -156,10 +223,14 @@ def diagnosis_lines(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     list of pairs of str
         Title and text of each line.
     """
-    statement = diagnosis.statement
-    findings = [("", finding.statement) for finding in diagnosis.findings if finding.statement not in statement]
-    ambiguities = [("", ambiguity.statement) for ambiguity in diagnosis.ambiguity]
-    return [("diagnosis", statement), *findings, *ambiguities, *_warnings(diagnosis.warnings)]
+    findings = [finding.statement for finding in diagnosis.findings]
+    verdict = diagnosis.statement
+    for statement in (*findings, *diagnosis.statements):  # each on a line of its own
+        verdict = " ".join(verdict.replace(statement, "").split())
+    texts = [*findings, verdict] if diagnosis.is_explained else [verdict, *findings]
+    texts += [*diagnosis.statements, *(ambiguity.statement for ambiguity in diagnosis.ambiguity)]
+    lines = [("" if place else "diagnosis", text) for place, text in enumerate(filter(None, texts))]
+    return [*lines, *_notes(diagnosis.warnings)]
 
 
 def reduced_lines(reduced: ReducedModel) -> list[tuple[str, str]]:
@@ -176,7 +247,9 @@ def reduced_lines(reduced: ReducedModel) -> list[tuple[str, str]]:
         Title and text of each line.
     """
     dofs = " ".join(dof.name for dof in reduced.dofs)
-    return [("model", f"reduced to {len(reduced.dofs)} DOFs: {dofs}"), *[("", text) for text in reduced.choices]]
+    listed = f"dofs: {', '.join(dof.name for dof in reduced.dofs)}"  # what the first line says
+    choices = [text for text in reduced.choices if text != listed]
+    return [("model", f"reduced to {len(reduced.dofs)} DOFs: {dofs}"), *[("", text) for text in choices]]
 
 
 def pairs_lines(pairs: Pairs) -> list[tuple[str, str]]:
@@ -192,15 +265,8 @@ def pairs_lines(pairs: Pairs) -> list[tuple[str, str]]:
     list of pairs of str
         Title and text of each line.
     """
-    counts = {
-        kind: (
-            sum(row.kind == kind and row.verdict is PairVerdict.PAIRED for row in pairs.rows),
-            sum(row.kind == kind and row.measured >= 0 for row in pairs.rows),
-        )
-        for kind in ("pole", "zero")
-    }
-    text = ", ".join(f"{paired} of {measured} measured {kind}s" for kind, (paired, measured) in counts.items())
-    return [("pairs", f"{text} have a counterpart in the model"), *_warnings(pairs.warnings)]
+    poles, zeros = (pairs.count(kind) for kind in ("pole", "zero"))
+    return [("pairs", poles.text), ("", zeros.text), *_notes(pairs.warnings)]
 
 
 def update_lines(updated: UpdatedModel) -> list[tuple[str, str]]:
@@ -219,8 +285,8 @@ def update_lines(updated: UpdatedModel) -> list[tuple[str, str]]:
     text = f"{updated.method}: {updated.status.value}, {len(updated.history)} iterations"
     return [
         ("update", text),
-        *[("", f"cannot be met: {target}") for target in updated.unmet],
-        *_warnings(updated.warnings),
+        *[(NOTE, f"cannot be met: {target}") for target in updated.unmet],
+        *_notes(updated.warnings),
     ]
 
 
@@ -237,14 +303,16 @@ def prediction_lines(prediction: Prediction) -> list[tuple[str, str]]:
     list of pairs of str
         Title and text of each line.
     """
+    widths = prediction.half_width_db
+    order = np.argsort(-np.nan_to_num(widths, nan=-1.0), kind="stable")
     lines = []
-    for index, label in enumerate(prediction.labels):
-        with np.errstate(divide="ignore", invalid="ignore"):  # a band may reach down to nothing, or be unknown
-            width = 10 * np.log10(prediction.magnitude_high[:, index] / prediction.magnitude_low[:, index])
-        band = f", 90 % band +-{np.nanmedian(width):.2g} dB (median)" if np.isfinite(width).any() else ""
+    for index in order[:MOST_PREDICTIONS]:
         shape = ", its shape only" if index in prediction.relative else ""
-        lines.append(("prediction", f"{label}{shape}{band}"))
-    return [*lines, *_warnings(prediction.warnings)]
+        band = f", 90 % band +-{widths[index]:.2g} dB ({prediction.band_text}, median)"
+        lines.append(("prediction", f"{prediction.labels[index]}{shape}{band if np.isfinite(widths[index]) else ''}"))
+    if len(order) > MOST_PREDICTIONS:
+        lines.append(("", f"and {len(order) - MOST_PREDICTIONS} more, with narrower bands"))
+    return [*lines, *_notes(prediction.warnings)]
 
 
 def state_space_lines(model: StateSpaceModel) -> list[tuple[str, str]]:
@@ -260,8 +328,8 @@ def state_space_lines(model: StateSpaceModel) -> list[tuple[str, str]]:
     list of pairs of str
         Title and text of each line.
     """
-    return [("export" if not place else "", text) for place, text in enumerate(model.notes)]
+    return _notes(model.notes)
 
 
-def _warnings(texts: Sequence[str]) -> list[tuple[str, str]]:
-    return [("  note", text) for text in texts]
+def _notes(texts: Sequence[str]) -> list[tuple[str, str]]:
+    return [(NOTE, text) for text in texts]

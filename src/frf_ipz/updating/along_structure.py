@@ -129,10 +129,14 @@ def _sentence(parts: pd.DataFrame, rows: np.ndarray, sign: int) -> str:
     largest = parts.iloc[int(rows[np.argmax(np.abs(np.log(ratio[rows])))])]
     first, last = parts.iloc[int(rows[0])], parts.iloc[int(rows[-1])]
     where = f"{first['name']}" if len(rows) == 1 else f"{first['name']} to {last['name']}"
+    most = f"most at {largest['name']}: " if len(rows) > 1 else ""
+    change, *ends = (
+        f"{100 * (largest[name] - 1):+.2g}"
+        for name in ("stiffness_ratio", "stiffness_ratio_low", "stiffness_ratio_high")
+    )
     return (
         f"{where} (nodes {first['nodes'].split()[0]} to {last['nodes'].split()[-1]}): {SIGNS[sign]} than modelled, "
-        f"most at {largest['name']}: {largest['stiffness_ratio']:.3g} times "
-        f"({largest['stiffness_ratio_low']:.3g} to {largest['stiffness_ratio_high']:.3g})"
+        f"{most}{change} % (90 %: {ends[0]} to {ends[1]} %)"
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.result import Ambiguity
+from frf_ipz.diagnosis.result import Ambiguity, as_appearance
 from frf_ipz.plotting.structure import finding_nodes, mismatch_nodes
 from frf_ipz.report.findings import card_texts, typeset, verdict_of
 from frf_ipz.report.section import Figure, Table
@@ -46,13 +46,27 @@ def test_nothing_missing_is_said(run):
 
 
 def test_what_nothing_explains_is_unknown(run):
-    diagnosis = replace(run.diagnosis, verdict="unexplained")
+    looks = tuple(replace(entry, statement=as_appearance(entry.statement)) for entry in run.diagnosis.findings)
+    diagnosis = replace(run.diagnosis, verdict="unexplained", findings=looks)
     assert "nothing in the catalogue explains" in verdict_of(diagnosis)[0]
-    assert verdict_of(diagnosis)[1].startswith("A part of it looks like this: A mass")
+    assert verdict_of(diagnosis)[1].startswith("A part of it looks like this, and need not be: a mass")
     addition = verdict_of(replace(diagnosis, unexplained_part="damping is 2 % (+- 1 %)"))[1]
-    assert addition.startswith("What is not explained: damping is 2 % (± 1 %). A part of it looks like this: A mass")
+    assert addition.startswith("What is not explained: damping is 2 % (± 1 %). A part of it looks like this")
     assert card_texts(diagnosis)[0] == "unknown"
     assert card_texts(replace(diagnosis, findings=()))[0] == "unknown"
+    found = next(block for block in build(with_results(run, diagnosis=diagnosis)).blocks if isinstance(block, Table))
+    assert [row[1] for row in found.rows] == ["looks like", "looks like", "alternative"]
+
+
+def test_measured_damping_is_nothing_missing(run):
+    """The formal verdict stays; whatever people read says that nothing remains."""
+    said = "Damping ratios are as measured, and nothing missing: 1.5 % at 16 Hz (model: 0.1 %)."
+    damping = replace(run.diagnosis, verdict="unexplained", statements=(said,))
+    assert damping.is_explained
+    assert card_texts(damping) == card_texts(run.diagnosis)
+    assert card_texts(replace(damping, findings=())) == ("nothing", "but damping, which is as measured")
+    assert verdict_of(damping)[0].startswith("A mass")
+    assert not replace(damping, unexplained_part="something").is_explained
 
 
 def test_places_of_findings_are_marked_on_the_structure(run):

@@ -61,7 +61,12 @@ def test_roots_that_the_model_lacks_are_counted(run):
 
 
 def test_errors_are_stated_with_the_gains_that_are_fitted(run):
-    frfs = replace(run.estimate.frfs, values=3.0 * run.estimate.frfs.values, unknown_scale="common")
+    frfs = replace(
+        run.estimate.frfs,
+        values=3.0 * run.estimate.frfs.values,
+        variance=9.0 * run.estimate.frfs.variance,
+        unknown_scale="common",
+    )
     scale = MeasuredScale(
         kind="common", labels=frfs.labels, log_gain=np.log([3.0]), sign=np.ones(1), draws=np.log([[3.0]])
     )

@@ -101,3 +101,13 @@ def test_the_table_survives_a_run_folder(local, tmp_path):
         save_result(result, tmp_path / f"{number}.result")
         back = load_result(tmp_path / f"{number}.result")
         pd.testing.assert_frame_equal(back.parts, result.parts, check_column_type=False, check_index_type=False)
+
+
+def test_one_part_alone_is_not_said_to_be_the_most(local):
+    case, updated_model = local
+    table = change_along_structure(updated_model, case.structure.nominal_model).head(3).copy()
+    table["stiffness_ratio"] = [1.0, 0.95, 1.0]
+    table["stiffness_ratio_low"], table["stiffness_ratio_high"] = [0.9, 0.9, 0.9], [1.1, 0.99996, 1.1]
+    (text,) = notable_changes(table)
+    assert "most at" not in text
+    assert text.endswith("softer than modelled, -5 % (90 %: -10 to -0.004 %)")

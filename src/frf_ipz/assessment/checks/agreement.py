@@ -16,6 +16,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from frf_ipz.assessment.assessment import Check, Verdict
+from frf_ipz.assessment.deviations import worst_median
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
@@ -42,11 +43,10 @@ def amplitude(evidence: Evidence) -> Iterator[Check]:
     Check
         One, where anything was measured above its noise.
     """
-    after, worst = _worst(_decibels(evidence, evidence.updated))
-    if worst < 0:
+    deviation = evidence.deviation
+    if deviation is None:
         return
-    before = float(np.nanmedian(_decibels(evidence, evidence.nominal)[:, worst]))
-    where = str(evidence.frfs.labels[worst])
+    after = deviation.updated_db
     relative = " (with the gains that are fitted: the scale is unknown)" if evidence.is_relative else ""
     yield Check(
         name="amplitude at the measured points",
@@ -54,9 +54,9 @@ def amplitude(evidence: Evidence) -> Iterator[Check]:
         figure=after,
         limit=SIXTH * GAIN_MARGIN_DB,
         unit="dB",
-        where=where,
-        says=f"the updated model is {after:.2g} dB off the measured FRF {where} in the median, before {before:.2g} dB"
-        f"{relative}; half of a gain margin of {GAIN_MARGIN_DB:g} dB is the most that a controller can bear",
+        where=deviation.frf,
+        says=f"the model is off the measured FRF {deviation.where} (median): {deviation.figures}{relative}; half of a "
+        f"gain margin of {GAIN_MARGIN_DB:g} dB is the most that a controller can bear",
         advice="" if after <= SIXTH * GAIN_MARGIN_DB else "compare model and measurement there; see the likely cause",
     )
 
@@ -75,11 +75,11 @@ def phase(evidence: Evidence) -> Iterator[Check]:
         One, where anything was measured above its noise.
     """
     turned = _phasors(evidence)
-    after, worst = _worst(np.where(evidence.is_heard, np.degrees(np.abs(np.angle(turned))), np.nan))
+    after, worst = worst_median(np.where(evidence.is_heard, np.degrees(np.abs(np.angle(turned))), np.nan))
     if worst < 0:
         return
     where = str(evidence.frfs.labels[worst])
-    says = f"the updated model is {after:.2g} degrees off the measured FRF {where} in the median"
+    says = f"the updated model is {after:.2g} degrees off the measured FRF {where} ({evidence.band_text}, median)"
     verdict, advice = judge(after, SIXTH * PHASE_MARGIN_DEG, HALF * PHASE_MARGIN_DEG), ""
     delay_s = common_delay(evidence.frfs.frequency_hz[evidence.lines], turned)
     on_time = turned * np.exp(2j * np.pi * evidence.frfs.frequency_hz[evidence.lines, None] * delay_s)
@@ -161,14 +161,17 @@ def improvement(evidence: Evidence) -> Iterator[Check]:
         One, where anything was measured above its noise.
     """
     after, before = (
-        float(np.nanmedian(_decibels(evidence, values))) if evidence.is_heard.any() else float("nan")
+        float(np.nanmedian(evidence.decibels(values))) if evidence.is_heard.any() else float("nan")
         for values in (evidence.updated, evidence.nominal)
     )
     if not np.isfinite(after):
         return
     noise = float(np.median(20 * np.log10(1 + (evidence.noise / np.abs(evidence.measured))[evidence.is_heard])))
     is_worse = after > before + noise and after > SIXTH * GAIN_MARGIN_DB
-    says = f"over all measured FRFs the model was {before:.2g} dB off in the median and is {after:.2g} dB off"
+    says = (
+        f"over all {evidence.frfs.n_frfs} measured FRFs ({evidence.band_text}, median) the model is off by "
+        f"{before:.2g} dB before updating, {after:.2g} dB after"
+    )
     yield Check(
         name="better than before",
         verdict=Verdict.WITH_CARE if is_worse else Verdict.USABLE,
@@ -215,22 +218,6 @@ def own_band(evidence: Evidence) -> Iterator[Check]:
         says=says + (", so at the points of interest it is too narrow too" if narrow else ""),
         advice="something is missing in the model: frf-ipz diagnose" if narrow else "",
     )
-
-
-def _decibels(evidence: Evidence, values: ComplexArray) -> FloatArray:
-    """(n_lines, n_frfs) differences of magnitudes, dB; NaN where an FRF does not stand above its noise."""
-    with np.errstate(divide="ignore", invalid="ignore"):  # an FRF may be 0
-        difference = np.abs(20 * np.log10(np.abs(values) / np.abs(evidence.measured)))
-    return np.where(evidence.is_heard, difference, np.nan)
-
-
-def _worst(values: FloatArray) -> tuple[float, int]:
-    """Give the largest median of the columns and its place; -1 where no column has a value."""
-    columns = np.flatnonzero(np.isfinite(values).any(axis=0))
-    if not len(columns):
-        return float("nan"), -1
-    medians = np.nanmedian(values[:, columns], axis=0)
-    return float(medians.max()), int(columns[np.argmax(medians)])
 
 
 def judge(figure: float, care: float, no_use: float) -> Verdict:

@@ -12,6 +12,7 @@ from frf_ipz.pairing.pairs import PairVerdict
 
 if TYPE_CHECKING:
     from frf_ipz.assessment.evidence import Evidence
+    from frf_ipz.pairing.pairs import Pair
 
 MOST_MISSING = 0.5  # of the measured modes: the model is one of another machine
 
@@ -29,24 +30,21 @@ def modes(evidence: Evidence) -> Iterator[Check]:
     Check
         One, where modes were measured.
     """
-    rows = [row for row in evidence.pairs.rows if row.kind == "pole" and row.measured >= 0]
-    if not rows:
+    count, missing = evidence.pairs.count("pole"), _missing(evidence, "pole")
+    if not count.measured:
         return
-    missing = [row for row in rows if row.verdict is PairVerdict.MISSING_IN_MODEL]
-    share = 1 - len(missing) / len(rows)
     verdict = Verdict.USABLE
     if missing:
-        verdict = Verdict.NOT_USABLE if 1 - share > MOST_MISSING else Verdict.WITH_CARE
+        verdict = Verdict.NOT_USABLE if 1 - count.share > MOST_MISSING else Verdict.WITH_CARE
     where = ", ".join(f"{abs(row.measured_value) / (2 * np.pi):.4g}" for row in missing)
-    says = f"{len(rows) - len(missing)} of {len(rows)} measured modes have a counterpart in the model"
     yield Check(
         name="modes with a counterpart",
         verdict=verdict,
-        figure=share,
+        figure=count.share,
         limit=1.0,
         unit="1",
         where=f"{where} Hz" if missing else "",
-        says=says + (f"; without one: {where} Hz" if missing else ""),
+        says=count.text + (f"; missing: {where} Hz" if missing else ""),
         advice="look for what the model leaves out, or whether such a mode is false" if missing else "",
     )
 
@@ -64,23 +62,22 @@ def zeros(evidence: Evidence) -> Iterator[Check]:
     Check
         One, where zeros were identified.
     """
-    rows = [
-        row
-        for row in evidence.pairs.rows
-        if row.kind == "zero" and row.measured >= 0 and evidence.fit.zeros.identifiable[row.measured]
-    ]
-    if not rows:
+    count, missing = evidence.pairs.count("zero"), _missing(evidence, "zero")
+    if not count.measured:
         return
-    missing = [row for row in rows if row.verdict is PairVerdict.MISSING_IN_MODEL]
-    share = 1 - len(missing) / len(rows)
-    many = 1 - share > MOST_MISSING
+    many = 1 - count.share > MOST_MISSING
     yield Check(
         name="zeros with a counterpart",
         verdict=Verdict.WITH_CARE if many else Verdict.USABLE,
-        figure=share,
+        figure=count.share,
         limit=1 - MOST_MISSING,
         unit="1",
         where=str(evidence.pairs.labels[missing[0].frf]) if missing else "",
-        says=f"{len(rows) - len(missing)} of {len(rows)} identified zeros have a counterpart in the model",
+        says=count.text,
         advice="zeros depend on where sensors and excitation are: check the dofs of the test" if many else "",
     )
+
+
+def _missing(evidence: Evidence, kind: str) -> list[Pair]:
+    rows = evidence.pairs.rows
+    return [row for row in rows if row.kind == kind and row.verdict is PairVerdict.MISSING_IN_MODEL]

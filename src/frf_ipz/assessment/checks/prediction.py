@@ -9,7 +9,6 @@ import numpy as np
 
 from frf_ipz.assessment.assessment import Check, Verdict
 from frf_ipz.assessment.checks.agreement import GAIN_MARGIN_DB, HALF, INSIDE, MOSTLY_OUTSIDE, SIXTH, judge
-from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.prediction.reference import measured_at
 
 if TYPE_CHECKING:
@@ -32,9 +31,8 @@ def band_width(evidence: Evidence) -> Iterator[Check]:
     prediction = evidence.prediction
     if not prediction.labels:
         return
-    with np.errstate(divide="ignore", invalid="ignore"):  # a band may reach down to nothing, or be unknown
-        ratios = prediction.magnitude_high / prediction.magnitude_low
-    if not np.isfinite(ratios).any():
+    widths = prediction.half_width_db
+    if np.isnan(widths).all():
         yield Check(
             name="band at the points of interest",
             verdict=Verdict.WITH_CARE,
@@ -42,10 +40,7 @@ def band_width(evidence: Evidence) -> Iterator[Check]:
             advice='use [update] method = "minimal-change"',
         )
         return
-    is_known = np.isfinite(ratios).any(axis=0)
-    widths = np.zeros(len(prediction.labels))
-    widths[is_known] = 10 * np.log10(np.nanmedian(ratios[:, is_known], axis=0))
-    worst = int(np.argmax(widths))
+    worst = int(np.nanargmax(widths))
     width, where = float(widths[worst]), str(prediction.labels[worst])
     yield Check(
         name="band at the points of interest",
@@ -54,7 +49,7 @@ def band_width(evidence: Evidence) -> Iterator[Check]:
         limit=SIXTH * GAIN_MARGIN_DB,
         unit="dB",
         where=where,
-        says=f"the 90 % band of {where} is ±{width:.2g} dB in the median",
+        says=f"the 90 % band of {where} is ±{width:.2g} dB ({prediction.band_text}, median)",
         advice="measure nearer to the point, or at more points" if width > SIXTH * GAIN_MARGIN_DB else "",
     )
 
@@ -72,18 +67,14 @@ def reference(evidence: Evidence) -> Iterator[Check]:
     Check
         One, where there are such FRFs.
     """
-    prediction = evidence.prediction
-    known = measured_at(prediction, evidence.reference) or measured_at(prediction, evidence.frfs)
-    if not known:
+    prediction, deviation = evidence.prediction, evidence.point_deviation
+    if deviation is None:
         return
+    known = measured_at(prediction, evidence.reference) or measured_at(prediction, evidence.frfs)
     columns = list(known)
     measured = np.stack([known[column] for column in columns], 1)
     lines = np.isfinite(measured).all(axis=1)
-    if not lines.any():
-        return
-    agreement = compare_frfs(measured[lines], prediction.values[lines][:, columns])
-    worst = int(np.argmax(agreement.median_db))
-    off, where = float(agreement.median_db[worst]), str(prediction.labels[columns[worst]])
+    off, where = deviation.updated_db, deviation.frf
     low, high = (band[lines][:, columns] for band in (prediction.magnitude_low, prediction.magnitude_high))
     magnitude = np.abs(measured[lines])
     share = float(np.mean((magnitude >= low) & (magnitude <= high))) if np.isfinite(low).any() else float("nan")
@@ -91,7 +82,7 @@ def reference(evidence: Evidence) -> Iterator[Check]:
     inside = judge(1 - share, 1 - INSIDE, 1 - MOSTLY_OUTSIDE) if np.isfinite(share) else Verdict.USABLE
     if inside is not Verdict.USABLE and verdict is Verdict.USABLE:
         verdict = Verdict.WITH_CARE  # close to what was measured, though the band says closer
-    text = f", and its 90 % band holds {share:.0%} of the lines" if np.isfinite(share) else ""
+    text = f"; its 90 % band holds {share:.0%} of the lines" if np.isfinite(share) else ""
     text += " (compared in shape: the level is not known)" if prediction.relative else ""
     yield Check(
         name="reference at the points of interest",
@@ -100,6 +91,6 @@ def reference(evidence: Evidence) -> Iterator[Check]:
         limit=SIXTH * GAIN_MARGIN_DB,
         unit="dB",
         where=where,
-        says=f"the prediction is {off:.2g} dB off the FRF {where} that was kept aside{text}",
+        says=f"the prediction is off the FRF {deviation.where} that was kept aside (median): {deviation.figures}{text}",
         advice="" if verdict is Verdict.USABLE else "believe the reference: look for what the model leaves out",
     )

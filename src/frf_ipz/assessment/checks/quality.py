@@ -149,13 +149,15 @@ def diagnosis(evidence: Evidence) -> Iterator[Check]:
     found = evidence.diagnosis
     if found is None:
         says, verdict, advice = "not looked for", Verdict.USABLE, "frf-ipz diagnose looks for what the model leaves out"
-    elif found.verdict == "unexplained":
+    elif not found.is_explained:
         says, verdict = "something is missing in the model that no known effect explains", Verdict.WITH_CARE
         advice = "see the section on the diagnosis"
-    elif found.verdict == "explained" and evidence.is_corrected:
+    elif found.findings and evidence.is_corrected:
         says, verdict, advice = "what is missing in the model was found, and put into it", Verdict.USABLE, ""
-    elif found.verdict == "explained":
-        says, verdict = "what is missing in the model was found; the prediction is made without it", Verdict.WITH_CARE
+    elif found.findings:
+        names = ", ".join(f"{finding.effect.replace('_', ' ')} ({finding.confidence})" for finding in found.findings)
+        says = f"what is missing in the model was found: {names}; the prediction is made without it"
+        verdict = Verdict.WITH_CARE
         advice = "put it into the model, or set [diagnose] apply = true"
     else:
         says, verdict, advice = "nothing significant is missing in the model", Verdict.USABLE, ""

@@ -10,6 +10,7 @@ from scipy.signal import periodogram
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.noise import Noise, fit_noise
+from frf_ipz.diagnosis.measured.noise_growth import STEADY, NoiseGrowth, growth_of_levels
 from frf_ipz.diagnosis.observations import ObservedRecord
 
 PULSE_PART = 3e-3  # of the peak: above, a sample belongs to the pulse
@@ -159,7 +160,7 @@ def _noise_std(quiet: FloatArray) -> float:
     return float(np.sqrt(np.median([block.mean() for block in squares])))
 
 
-def estimate_force_noise(records: tuple[ObservedRecord, ...], pulses: tuple[Pulse, ...]) -> Noise:
+def estimate_force_noise(records: tuple[ObservedRecord, ...], pulses: tuple[Pulse, ...]) -> tuple[Noise, NoiseGrowth]:
     """Estimate the noise of the force channel where nothing touches.
 
     Parameters
@@ -171,23 +172,30 @@ def estimate_force_noise(records: tuple[ObservedRecord, ...], pulses: tuple[Puls
 
     Returns
     -------
-    Noise
-        N^2 s.
+    noise : Noise
+        N^2 s, of a record with the reference's energy.
+    growth : NoiseGrowth
+        How it grows with the level.
     """
     frequencies: list[FloatArray] = []
     energies: list[FloatArray] = []
+    quiet_records: list[ObservedRecord] = []
     for record, pulse in zip(records, pulses, strict=True):
         quiet = record.force[pulse.stop + NOISE_DELAY :]
         if len(quiet) < 64:
             continue
+        quiet_records.append(record)
         frequency, density = periodogram(quiet, 1 / record.step_s, detrend=False)
         inside = (frequency > 0) & (frequency < 0.4 / record.step_s)
         frequencies.append(frequency[inside])
         energies.append(density[inside] / 2)
     if not frequencies:
-        return Noise(white=0.0)
-    frequency, energy = np.concatenate(frequencies), np.concatenate(energies)
-    return fit_noise(frequency, energy, np.ones_like(energy), np.zeros_like(energy))
+        return Noise(white=0.0), STEADY
+    growth = growth_of_levels(quiet_records, np.array([np.median(energy) for energy in energies]))
+    frequency = np.concatenate(frequencies)
+    scaled = zip(energies, growth.scales(quiet_records), strict=True)
+    energy = np.concatenate([of_record / scale for of_record, scale in scaled])
+    return fit_noise(frequency, energy, np.ones_like(energy), np.zeros_like(energy)), growth
 
 
 def gate_covariance(s: ComplexArray, pulse: Pulse) -> ComplexArray:

@@ -21,6 +21,7 @@ from frf_ipz.diagnosis.measured.forces import (
 )
 from frf_ipz.diagnosis.measured.group_spectra import GroupSpectra, group_records, transform_group
 from frf_ipz.diagnosis.measured.noise import Noise, fit_force_noise, fit_noise
+from frf_ipz.diagnosis.measured.noise_growth import STEADY, NoiseGrowth, fit_growth
 from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
 from frf_ipz.diagnosis.observations import Observations, ObservedRecord, transform_records
 from frf_ipz.frf import FrfLabel
@@ -49,7 +50,11 @@ class RecordSurvey:
     force : Noise
         Of the force channel.
     responses : dict of str to Noise
-        Of each output channel.
+        Of each output channel, in the mean of its records.
+    force_growth : NoiseGrowth
+        How much more of it strong records have than weak ones.
+    response_growth : dict of str to NoiseGrowth
+        The same of each output channel.
     resonances : Resonances
         Peaks of all FRFs.
     least_decay_1_s : float
@@ -60,6 +65,8 @@ class RecordSurvey:
     pulses: tuple[tuple[Pulse, ...], ...]
     force: Noise
     responses: dict[str, Noise]
+    force_growth: NoiseGrowth
+    response_growth: dict[str, NoiseGrowth]
     resonances: Resonances
     least_decay_1_s: float
 
@@ -90,15 +97,18 @@ def survey_records(observations: Observations) -> RecordSurvey:
     ]
     if is_hammer:
         flat = tuple(pulse for group in whole for pulse in group)
-        noise = estimate_force_noise(tuple(record for group in group_records(observations) for record in group), flat)
+        recorded = tuple(record for group in group_records(observations) for record in group)
+        noise, force_growth = estimate_force_noise(recorded, flat)
     else:
-        noise = _shaker_force_noise(groups, group_spectra, truncation)
-    responses = _response_noise(whole, pulses, group_spectra, noise, truncation)
+        noise, force_growth = _shaker_force_noise(groups, group_spectra, truncation), STEADY
+    responses, response_growth = _response_noise(whole, pulses, group_spectra, (noise, force_growth), truncation)
     return RecordSurvey(
         groups=groups,
         pulses=pulses,
         force=noise,
         responses=responses,
+        force_growth=force_growth,
+        response_growth=response_growth,
         resonances=resonances,
         least_decay_1_s=_least_decay(decay, resonances) if is_hammer else decay,
     )
@@ -125,7 +135,8 @@ def with_records(survey: RecordSurvey, observations: Observations) -> RecordSurv
         Of these.
     """
     pulses = _cut_leads(_pulses_by_group(observations), observations.kind)
-    return replace(survey, groups=_records_of(pulses), pulses=pulses)
+    groups = _records_of(pulses)
+    return replace(survey, groups=groups, pulses=pulses)
 
 
 def _pulses_by_group(observations: Observations) -> tuple[tuple[Pulse, ...], ...]:
@@ -171,31 +182,39 @@ def _response_noise(
     whole: tuple[tuple[Pulse, ...], ...],
     pulses: tuple[tuple[Pulse, ...], ...],
     group_spectra: list[GroupSpectra],
-    force_noise: Noise,
+    force_noise: tuple[Noise, NoiseGrowth],
     truncation: list[FloatArray],
-) -> dict[str, Noise]:
-    """Estimate the noise of each output channel from what repeated records do not share."""
-    noise = {}
+) -> tuple[dict[str, Noise], dict[str, NoiseGrowth]]:
+    """Estimate the noise of each output channel, and its growth, from what repeated records do not share."""
+    noise, growths = {}, {}
+    of_force, force_growth = force_noise
     groups = _records_of(pulses)
     channels = dict.fromkeys(sensor.channel for group in groups for sensor in group[0].sensors)
     for channel in channels:
         stacks: list[tuple[FloatArray, ...]] = []
-        for index, (group, lines) in enumerate(zip(groups, group_spectra, strict=True)):
-            names = [sensor.channel for sensor in group[0].sensors]
-            if channel not in names or len(group) < 2:
-                continue
-            sensor = names.index(channel)
-            energy = lines.unexplained[:, sensor]
-            gate_s = np.mean([gate_variance(lines.s, pulse) for pulse in pulses[index]], axis=0)
-            known = np.abs(lines.values[:, sensor]) ** 2 * force_noise.density(lines.frequency_hz) * gate_s
+        having = [
+            (index, [sensor.channel for sensor in group[0].sensors].index(channel))
+            for index, group in enumerate(groups)
+            if channel in [sensor.channel for sensor in group[0].sensors] and len(group) > 1
+        ]
+        growth = growths[channel] = fit_growth(
+            [(groups[index], group_spectra[index], sensor) for index, sensor in having]
+        )
+        for index, sensor in having:
+            group, lines = groups[index], group_spectra[index]
+            gates = np.array([gate_variance(lines.s, pulse) for pulse in pulses[index]])
+            gate_s = np.mean(force_growth.scales(group)[:, None] * gates, axis=0)
+            known = np.abs(lines.values[:, sensor]) ** 2 * of_force.density(lines.frequency_hz) * gate_s
             known += truncation[index][:, sensor]
-            stacks.append((lines.frequency_hz, energy, _noise_gain(group, lines), known))
+            share = growth.unexplained_share(group, lines)
+            energy = lines.unexplained[:, sensor]
+            stacks.append((lines.frequency_hz, energy, share * _noise_gain(group, lines), known))
         if stacks:
-            fitted = fit_noise(*(np.concatenate(parts) for parts in zip(*stacks, strict=True)))
+            fitted = fit_noise(*(np.concatenate(values) for values in zip(*stacks, strict=True)))
             noise[channel] = fitted.rounded(_signals(groups, channel), groups[0][0].step_s)
         else:
             noise[channel] = _unrepeated_noise(groups, whole, group_spectra, channel)
-    return noise
+    return noise, growths
 
 
 def _signals(groups: tuple[tuple[ObservedRecord, ...], ...], channel: str) -> list[FloatArray]:
@@ -284,7 +303,7 @@ def estimate_transfer_functions(survey: RecordSurvey, s: ComplexArray) -> Transf
         points = _transform_to(group, s)
         bias_factor = _bias_factor(survey, index, points)
         size = np.maximum(np.abs(points.values), np.abs(_transform_to(group, wide).values))
-        crossed = points.force.conj() @ points.force.T / np.outer(points.power, points.power)
+        by_power = np.outer(points.power, points.power)
         units, amplitudes = _truncated_motion(survey.resonances, points, group)
         units *= (points.force.conj() / points.power[:, None])[..., None]
         shared_errors.append(_shared_errors(survey, index, points))
@@ -294,6 +313,8 @@ def estimate_transfer_functions(survey: RecordSurvey, s: ComplexArray) -> Transf
             )
             values.append(points.values[:, column] * bias_factor)
             sizes.append(size[:, column])
+            scales = survey.response_growth[sensor.channel].scales(group)
+            crossed = (points.force.conj() * scales) @ points.force.T / by_power
             noise = crossed * _noise_covariance(survey.responses[sensor.channel], s, _duration_s(group))
             errors = np.column_stack(
                 [
@@ -363,7 +384,8 @@ def _truncation_energy(resonances: Resonances, lines: GroupSpectra, group: tuple
 def _bias_factor(survey: RecordSurvey, index: int, points: GroupSpectra) -> FloatArray:
     """Factor that corrects the bias of FRFs by noise of the force, which adds to the force's power."""
     noise = survey.force.density(points.frequency_hz)
-    added = noise * np.sum([gate_variance(points.s, pulse) for pulse in survey.pulses[index]], axis=0)
+    gates = np.array([gate_variance(points.s, pulse) for pulse in survey.pulses[index]])
+    added = noise * (survey.force_growth.scales(survey.groups[index]) @ gates)
     return np.asarray(1 / (1 - np.minimum(added / points.power, MAX_BIAS)))
 
 
@@ -391,9 +413,10 @@ def _shared_errors(survey: RecordSurvey, index: int, points: GroupSpectra) -> Co
     s = points.s
     root = np.sqrt(survey.force.density(points.frequency_hz))
     total = np.zeros((n, n), np.complex128)
+    scales = survey.force_growth.scales(survey.groups[index])
     for column, pulse in enumerate(survey.pulses[index]):
         force = points.force[:, column]
-        total += np.outer(force.conj(), force) * gate_covariance(s, pulse)
+        total += scales[column] * np.outer(force.conj(), force) * gate_covariance(s, pulse)
     total *= np.outer(root, root) / np.outer(points.power, points.power)
     stds = np.sqrt(np.diag(total).real)  # lines that a shaker hardly drives err by far more than others
     values, vectors = linalg.eigh(total / np.outer(stds, stds))

@@ -87,7 +87,7 @@ def read_noise(observations: Observations) -> ChannelNoise:
             estimate_decayed_noise([s[len(s) // 2 :] for s in of_sensor], step).rounded(of_sensor, step)
             for of_sensor in signals
         ]
-        force = estimate_force_noise(observations.records, pulses)
+        force, _ = estimate_force_noise(observations.records, pulses)
         return ChannelNoise(is_hammer=True, sensors=sensors, force=force, responses=tuple(responses), pulse_s=length)
     forces = [record.force for record in observations.records]
     lines = _find_undriven_lines(forces, step, observations.band_hz)

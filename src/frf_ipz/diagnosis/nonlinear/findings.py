@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.result import Estimate, Finding, describe_location_set
+from frf_ipz.diagnosis.result import Estimate, Finding, describe_location_set, with_confidence
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -78,13 +78,15 @@ def make_findings(
         share = np.cumsum(probability[of_law]) / max(probability[of_law].sum(), 1e-300)
         covering = of_law[: min(int(np.searchsorted(share, COVERAGE)) + 1, MAX_LOCATIONS)]
         location_set = tuple(dict(modal_model.locations[fits[i].location].entries) for i in covering)
-        phrase = fit.law.phrase.format(f"{fit.strength:.3g}", f"{fit.shape:.3g}")
-        statement = f"At {location.words} sits {phrase} that the model lacks."
+        estimates = _estimate_parameters(fit, scale)
+        phrase = fit.law.phrase.format(*(estimate.in_words() for estimate in estimates.values()))
+        law_probability = float(probability[of_law].sum())
+        statement = with_confidence(f"At {location.words} sits {phrase} that the model lacks.", law_probability)
         findings[fit.law.name] = Finding(
             effect=fit.law.name,
             location=dict(location.entries),
-            parameters=_estimate_parameters(fit, scale),
-            probability=float(probability[of_law].sum()),
+            parameters=estimates,
+            probability=law_probability,
             log_evidence_gain=float(gains[index]),
             statement=statement + describe_location_set(location_set),
             location_set=location_set,

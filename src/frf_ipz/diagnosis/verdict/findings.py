@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import expit
 
-from frf_ipz.diagnosis.result import Estimate, Finding, describe_location_set
+from frf_ipz.diagnosis.result import Estimate, Finding, describe_location_set, with_confidence
 from frf_ipz.diagnosis.search.component_search import group_by_effect
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def make_finding(ranked_effect: RankedEffect, gain: float, scale: float) -> Find
     return describe_component(
         ranked_effect.best,
         -1,
-        ranked_effect.probability,
+        min(ranked_effect.probability, probability_of_need(gain, scale)),
         gain,
         scale,
         location_set=_location_set(ranked_effect),
@@ -164,13 +165,33 @@ def describe_component(
         parameters={**component.location.text, **estimates},
         probability=probability,
         log_evidence_gain=gain,
-        statement=component.effect.statement(hypothesis.context, component.location, estimates)
+        statement=with_confidence(
+            component.effect.statement(hypothesis.context, component.location, estimates), probability
+        )
         + describe_location_set(location_set),
         location_set=location_set,
         is_significant=is_significant(fit, index),
         key=component.location.key,
         values=tuple(float(value) for value in fit.values[start : start + hypothesis.counts[index]]),
     )
+
+
+def probability_of_need(gain: float, scale: float) -> float:
+    """Give the probability that an effect is needed beside what else was found: even before the measurement.
+
+    Parameters
+    ----------
+    gain : float
+        Its log Bayes factor over the fit without it.
+    scale : float
+        As for `rank_effects`.
+
+    Returns
+    -------
+    float
+        Below one half where the evidence speaks against it.
+    """
+    return float(expit(gain / scale))
 
 
 def _location_set(ranked_effect: RankedEffect) -> tuple[dict[str, object], ...]:

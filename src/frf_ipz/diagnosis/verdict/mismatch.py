@@ -76,18 +76,19 @@ def _tabulate(frequency: FloatArray, before: FloatArray, after: FloatArray, name
 
 
 def _describe_table(table: pd.DataFrame, frequency_hz: FloatArray) -> str:
-    if not len(frequency_hz):
-        return "The model agrees with every FRF of the band within noise and tolerances."
     ranked = table.sort_values("before", ascending=False).head(N_NAMED)
     parts = [
         f"{row.frf} from {row.low_hz:.4g} to {row.high_hz:.4g} Hz ({row.before:.3g} times)"
         for row in ranked.itertuples()
     ]
+    worst = f"most of all, in units of what noise and tolerances explain, {'; '.join(parts)}."
+    if not len(frequency_hz):
+        return f"No line differs by more than {DISAGREES:g} times what noise and tolerances explain; {worst}"
     by_frf = table.groupby("frf")["before"].max().sort_values(ascending=False)
     off = [name for name, value in by_frf.items() if value > DISAGREES]
     return (
         f"{len(off)} of {len(by_frf)} FRFs disagree, between {frequency_hz.min():.4g} and {frequency_hz.max():.4g} Hz; "
-        f"most of all, in units of what noise and tolerances explain, {'; '.join(parts)}."
+        f"{worst}"
     )
 
 

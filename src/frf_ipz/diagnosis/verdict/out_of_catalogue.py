@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 STATED_FROM = 0.3  # relative deviation of a damping ratio that is stated, however wide the tolerance: its default
 DAMPING_EFFECTS = ("damping_level", "structural_damping")
 FREE_TOLERANCE = 20.0  # relative tolerance of damping ratios: more than a factor of ten
+MOST_RATIOS = 6  # in a sentence
 MAIN_PART = 0.5  # of the whole nuisance chi2
 SAME_LOCATION = 0.05  # of the largest extent of a structure
 TWO_DYNAMIC = (
@@ -136,12 +137,13 @@ def describe_damping(fit: Fit, options: DiagnoseOptions) -> str:
     if not len(beyond):
         return ""
     ratios = [
-        f"{100 * stated * (1 + change):.2g} % instead of {100 * stated:.2g} % at {omega / (2 * np.pi):.4g} Hz"
+        f"{100 * stated * (1 + change):.2g} % at {omega / (2 * np.pi):.4g} Hz (model: {100 * stated:.2g} %)"
         for stated, change, omega in zip(
             modes.stated_ratio[beyond], np.maximum(changes[beyond], -1), modes.omega[beyond], strict=True
         )
     ]
-    return f"Damping is as measured, not as in the model: {', '.join(ratios)}."
+    rest = f" and of {len(ratios) - MOST_RATIOS} further modes" if len(ratios) > MOST_RATIOS else ""
+    return f"Damping ratios are as measured, and nothing missing: {', '.join(ratios[:MOST_RATIOS])}{rest}."
 
 
 def describe_implausibility(fit: Fit) -> str:

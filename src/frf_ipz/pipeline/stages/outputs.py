@@ -102,6 +102,7 @@ def assess(
     prediction: Prediction,
     *,
     diagnosis: Diagnosis | None,
+    with_causes: Prediction | None = None,
 ) -> Assessment:
     """Say whether the result can be used, in `run.json` too.
 
@@ -125,6 +126,8 @@ def assess(
         FRFs at the points of interest.
     diagnosis : Diagnosis, optional
         What the model left out; None where it was not looked for.
+    with_causes : Prediction, optional
+        FRFs at the points of interest of a model that has what the diagnosis found.
 
     Returns
     -------
@@ -133,7 +136,7 @@ def assess(
     """
     inputs = runner.inputs
     named = places_of_mistakes(inputs)
-    optional = {"diagnose": diagnosis, "reference": inputs.reference}
+    optional = {"diagnose": diagnosis, "reference": inputs.reference, "causes": with_causes}
     rests_on = ("predict", *(name for name, result in optional.items() if result is not None))
     assessment = runner.stage(
         "assess",
@@ -149,6 +152,7 @@ def assess(
                 reference=inputs.reference,
                 diagnosis=diagnosis,
                 is_corrected=inputs.options.diagnose.apply,
+                with_causes=with_causes,
                 impacts=traces if inputs.test.kind == "hammer" else (),
                 is_recorded=inputs.test.kind != "frf",
                 **named,

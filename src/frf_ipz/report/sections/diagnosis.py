@@ -67,7 +67,8 @@ def build(run: Results) -> Section | None:
 
 def _finding_table(diagnosis: Diagnosis) -> Table:
     rows = []
-    for kind, entries in (("found", diagnosis.findings), ("alternative", diagnosis.alternatives[:MOST_ALTERNATIVES])):
+    found = "found" if diagnosis.is_explained else "looks like"
+    for kind, entries in ((found, diagnosis.findings), ("alternative", diagnosis.alternatives[:MOST_ALTERNATIVES])):
         rows += [
             [
                 effect_name(finding.effect),

@@ -8,8 +8,11 @@ import numpy as np
 
 from frf_ipz.plotting.wording import counted, number
 from frf_ipz.report.section import Section, Table, run_figures
+from frf_ipz.runs.figures import median_coherence
+from frf_ipz.runs.picture_data import fitted_lines
 
 if TYPE_CHECKING:
+    from frf_ipz.arrays import IntArray
     from frf_ipz.frf import FrfSet
     from frf_ipz.runs.results import Results
 
@@ -42,22 +45,22 @@ def build(run: Results) -> Section | None:
             "that back exactly."
         )
     lead = f"{text}, {number(step, 3)} Hz apart.{window}"
+    table = _table(frfs, fitted_lines(run))
     return Section(
         anchor="frfs",
         title="FRFs",
         lead=lead,
-        blocks=tuple(run_figures(run, "frfs", hints={"frf": ZOOM_HINT}, tables={"frf": _table(frfs)})),
+        blocks=tuple(run_figures(run, "frfs", hints={"frf": ZOOM_HINT}, tables={"frf": table})),
     )
 
 
-def _table(frfs: FrfSet) -> Table:
+def _table(frfs: FrfSet, lines: IntArray) -> Table:
     rows = []
     for frf, label in enumerate(frfs.labels):
-        coherence, variance = frfs.coherence[:, frf], frfs.variance[:, frf]
-        power = np.mean(np.abs(frfs.values[:, frf]) ** 2)
+        coherence, variance = frfs.coherence[lines, frf], frfs.variance[lines, frf]
+        power = np.mean(np.abs(frfs.values[lines, frf]) ** 2)
         known = np.isfinite(variance)
         noise = np.sqrt(np.mean(variance[known]) / power) if known.any() and power > 0 else np.nan
-        median = np.median(coherence[np.isfinite(coherence)]) if np.isfinite(coherence).any() else np.nan
         averages = str(int(frfs.averages[frf])) if frfs.averages[frf] else "–"
         rows.append(
             [
@@ -66,9 +69,10 @@ def _table(frfs: FrfSet) -> Table:
                 label.quantity.value,
                 label.unit,
                 averages,
-                number(float(median), 5),
+                median_coherence(coherence) or "–",
                 f"{number(100 * float(noise), 2)} %",
             ]
         )
     columns = ("output", "input", "quantity", "unit", "averages", "median coherence", "noise, of the RMS value")
-    return Table(caption="Measured FRFs", columns=columns, rows=rows, file="frf.parquet")
+    low, high = (number(float(frfs.frequency_hz[line])) for line in (lines[0], lines[-1])) if len(lines) else ("–", "–")
+    return Table(caption=f"Measured FRFs, {low} to {high} Hz", columns=columns, rows=rows, file="frf.parquet")

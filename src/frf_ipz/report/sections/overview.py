@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.assessment.assessment import Verdict
-from frf_ipz.pairing.pairs import PairVerdict
+from frf_ipz.assessment.deviations import POINTS
 from frf_ipz.plotting.wording import counted, listed, number, percent, small_percent
-from frf_ipz.prediction.agreement import compare_frfs
-from frf_ipz.prediction.reference import measured_at
 from frf_ipz.report.findings import card_texts, verdict_of
 from frf_ipz.report.section import Card, Cards, Headline, Section, Table, run_figures
-from frf_ipz.runs.picture_data import fitted_lines, model_values, update_targets
+from frf_ipz.runs.figures import coherence_text, deviation_of
+from frf_ipz.runs.picture_data import update_targets
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,6 +26,7 @@ VERDICTS = {
     Verdict.WITH_CARE: "To be used with care",
     Verdict.NOT_USABLE: "Not usable",
 }
+BESIDE = frozenset({"causes"})  # only where a diagnosis finds any: an old one may be left over
 NO_ERROR = 1e-5  # a smaller error of a frequency interests nobody
 
 
@@ -45,8 +45,8 @@ def build(run: Results) -> Section:
     """
     sentence, addition = verdict(run)
     notes: tuple[str, ...] = ()
-    if run.stale:
-        notes = (f"Made before the last change, and not yet run again: {listed(sorted(run.stale), 10)}.",)
+    if run.stale - BESIDE:
+        notes = (f"Made before the last change, and not yet run again: {listed(sorted(run.stale - BESIDE), 10)}.",)
     return Section(
         anchor="overview",
         title="Overview",
@@ -152,11 +152,15 @@ def _of_update(run: Results) -> str:
     kinds = {kind: sum(row.kind == kind for row in rows) for kind in ("pole", "zero")}
     paired = " and ".join(counted(count, f"measured {kind}") for kind, count in kinds.items() if count)
     text = f"The updated model has {paired} right within {_errors(rows)}"
-    width = _half_width_db(run)
-    points = [str(dof) for dof in run.points]
-    if points and np.isfinite(width):
-        shape = "the shape of " if run.prediction is not None and run.prediction.relative else ""
-        text += f", and predicts {shape}{listed(points, 3)} to ±{number(width, 2)} dB (90 % band, median)"
+    prediction = run.prediction
+    if prediction is not None and np.isfinite(prediction.half_width_db).any():
+        worst = int(np.nanargmax(prediction.half_width_db))
+        width = number(float(prediction.half_width_db[worst]), 2)
+        shape = "the shape of " if worst in prediction.relative else ""
+        text += f", and predicts {shape}{prediction.labels[worst]} to ±{width} dB"
+        text += f" (90 % band, {prediction.band_text}, median)"
+        others = len(prediction.labels) - 1
+        text += f" and {counted(others, 'other FRF')} to less" if others else ""
     return text + "."
 
 
@@ -172,16 +176,14 @@ def _errors(rows: Sequence[Target]) -> str:
 def _cards(run: Results) -> list[Card]:
     if run.updated_model is None:
         return _cards_without_model(run)
-    return [_point_card(run), _target_card(run), _missing_card(run)]
+    return [_deviation_card(run), _target_card(run), _missing_card(run)]
 
 
 def _cards_without_model(run: Results) -> list[Card]:
     cards = []
     if run.frfs is not None:
-        coherence = run.frfs.coherence[fitted_lines(run)]
-        known = coherence[np.isfinite(coherence)]
-        figure = number(float(np.median(known)), 5) if known.size else "unknown"
-        cards.append(Card("Coherence", figure, "median over the band; 1 is perfect"))
+        figure, _, band = coherence_text(run).partition(" (")
+        cards.append(Card("Coherence", figure or "unknown", band.rstrip(")") or "one record, or not stated"))
     if run.fit is not None:
         cards.insert(0, Card("Modes", str(run.fit.n_modes), "in the band"))
         ratio = run.fit.misfit["ratio"].to_numpy(float) if "ratio" in run.fit.misfit else np.zeros(0)
@@ -191,40 +193,19 @@ def _cards_without_model(run: Results) -> list[Card]:
     return cards
 
 
-def _point_card(run: Results) -> Card:
-    prediction = run.prediction
-    known = {}
-    if prediction is not None:
-        known = measured_at(prediction, run.reference) or measured_at(prediction, run.frfs)
-    if prediction is None or not known:
-        return _measured_card(run)
-    numbers = list(known)
-    measured = np.stack([known[index] for index in numbers], 1)
-    lines = np.isfinite(measured).all(axis=1)
-    before, after = (
-        compare_frfs(measured[lines], values[lines][:, numbers]) for values in (prediction.nominal, prediction.values)
-    )
-    figure = f"{number(float(before.median_db.mean()), 2)} → {number(float(after.median_db.mean()), 2)} dB"
-    correlations = f"{after.shape.min():.3f} in shape, {after.amplitude.min():.3f} in amplitude"
-    meaning = f"median over the band, before and after; correlation {correlations} (1 is perfect)"
-    return Card("Error at the point of interest", figure, meaning)
-
-
-def _measured_card(run: Results) -> Card:
-    updated, frfs = run.updated_model, run.frfs
-    if updated is None or frfs is None:
-        return Card("Error at measured points", "unknown", "no FRF was measured")
-    measured = frfs.values[fitted_lines(run)]
-    decibels, errors = [], []
-    for model in (updated.nominal, updated.model):
-        values = model_values(run, model)
-        decibels.append(number(float(np.median(compare_frfs(measured, values).median_db)), 2))
-        errors.append(percent(float(np.linalg.norm(measured - values) / np.linalg.norm(measured)), 2))
-    scaled = frfs.unknown_scale != "none"
-    meaning = "median over the band, before and after"
-    meaning += "; unknown gains are fitted" if scaled else f"; of the FRFs' norm: {errors[0]} → {errors[1]}"
+def _deviation_card(run: Results) -> Card:
+    deviation = deviation_of(run)
+    if deviation is None:
+        return Card("Error at the measured points", "unknown", "no FRF stands above its noise")
+    figures = [deviation.nominal_db, deviation.updated_db, deviation.with_causes_db]
+    figure = " → ".join(f"{value:.2g}" for value in figures if np.isfinite(value)) + " dB"
+    names = "before updating, after" + (", with the causes in the model" if np.isfinite(figures[2]) else "")
+    meaning = f"{names}; median of {deviation.where}, {deviation.described}"
+    if deviation.at == POINTS:
+        return Card("Error at the point of interest", figure, meaning)
+    meaning += "; unknown gains are fitted" if run.frfs is not None and run.frfs.unknown_scale != "none" else ""
     meaning += "; nothing was measured at the points of interest" if run.points else ""
-    return Card("Error at the measured points", f"{decibels[0]} → {decibels[1]} dB", meaning)
+    return Card("Error at the measured points", figure, meaning)
 
 
 def _target_card(run: Results) -> Card:
@@ -242,19 +223,8 @@ def _missing_card(run: Results) -> Card:
     if run.diagnosis is not None:
         figure, meaning = card_texts(run.diagnosis)
         return Card("Missing in the model", figure, meaning)
-    rows = () if run.pairs is None else run.pairs.rows
-    counts = {verdict: sum(row.verdict is verdict for row in rows) for verdict in PairVerdict}
-    lacking = counts[PairVerdict.MISSING_IN_MODEL]
+    counts = [] if run.pairs is None else [run.pairs.count(kind) for kind in ("pole", "zero")]
+    lacking = sum(count.missing for count in counts)
     figure = counted(lacking, "pole or zero", "poles and zeros") if lacking else "not looked for"
-    unsure = counts[PairVerdict.AMBIGUOUS]
-    meaning = "measured without a counterpart" if lacking else "all identifiable poles and zeros are paired"
-    meaning += f"; {unsure} are not identifiable" if unsure else ""
-    return Card("Missing in the model", figure, f"{meaning}; no diagnosis was run")
-
-
-def _half_width_db(run: Results) -> float:
-    if run.prediction is None:
-        return float("nan")
-    low, high = run.prediction.magnitude_low, run.prediction.magnitude_high
-    good = (low > 0) & np.isfinite(high)
-    return float(np.median(10 * np.log10(high[good] / low[good]))) if good.any() else float("nan")
+    meaning = "; ".join(count.text for count in counts if count.measured)
+    return Card("Missing in the model", figure, f"{meaning}; no diagnosis was run".removeprefix("; "))

@@ -34,9 +34,9 @@ def build(run: Results) -> Section | None:
     if run.pairs is None:
         return None
     rows = run.pairs.rows
-    counts = {verdict: sum(row.verdict is verdict for row in rows) for verdict in PairVerdict}
-    text = ", ".join(f"{count} {verdict.value}" for verdict, count in counts.items() if count)
-    lead = f"Poles and zeros of measurement and model: {text}." if text else "There is nothing to pair."
+    counts = [run.pairs.count(kind) for kind in ("pole", "zero")]
+    lead = ". ".join(count.text for count in counts if count.measured)
+    lead = f"{lead}." if lead else "There is nothing to pair."
     return Section(
         anchor="pairing",
         title="Pairing",

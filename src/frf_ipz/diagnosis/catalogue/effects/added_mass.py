@@ -68,7 +68,7 @@ class AddedMass(Effect):
         """Say how much sits where."""
         mass = values["mass_kg"]
         return (
-            f"A mass of {1e3 * mass.value:.3g} g (+- {1e3 * mass.std:.2g} g) sits at "
+            f"A mass of {mass.in_words('g', 1e3)} sits at "
             f"{context.describe_node(int(str(location.key[0])))} that the model lacks."
         )
 

@@ -106,9 +106,9 @@ class AttachedResonator(Effect):
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say what is attached where."""
         return (
-            f"A resonator of {1e3 * values['mass_kg'].value:.3g} g is attached at "
+            f"A resonator of {values['mass_kg'].in_words('g', 1e3)} is attached at "
             f"{context.describe_node(int(str(location.key[0])))} that the model lacks: its natural frequency is "
-            f"{values['frequency_hz'].value:.4g} Hz, its damping ratio {100 * values['damping_ratio'].value:.2g} %."
+            f"{values['frequency_hz'].in_words('Hz')}, its damping ratio {values['damping_ratio'].in_words('%', 100)}."
         )
 
 

@@ -58,9 +58,8 @@ class AxialLoad(Effect):
         del context, location
         force = values["force_N"]
         kind = "tension" if force.value > 0 else "compression"
-        return (
-            f"The beam carries an axial {kind} of {abs(force.value):.4g} N (+- {force.std:.2g}) that the model lacks."
-        )
+        size = force.in_words("N", 1.0 if force.value > 0 else -1.0)
+        return f"The beam carries an axial {kind} of {size} that the model lacks."
 
 
 @lru_cache(maxsize=2)  # a search asks for it with every hypothesis

@@ -83,8 +83,8 @@ class BoundaryCompliance(Effect):
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which support is compliant, and how much."""
         del context
-        texts = {ROTATION: "{:.4g} N m/rad in rotation", TRANSLATION: "{:.4g} N/m in translation"}
-        springs = " and ".join(texts[name].format(value.value) for name, value in values.items())
+        ways = {ROTATION: ("N m/rad", "in rotation"), TRANSLATION: ("N/m", "in translation")}
+        springs = " and ".join(f"{value.in_words(ways[name][0])} {ways[name][1]}" for name, value in values.items())
         return f"The {location.key[0]} end is not rigidly held: its support has a stiffness of {springs}."
 
 

@@ -88,10 +88,7 @@ class CouplingSpring(Effect):
         """Say how stiff, and between what."""
         stiffness = values["stiffness_N_m"]
         first, second = (context.describe_node(int(str(node))) for node in location.key[:2])
-        return (
-            f"A spring of {stiffness.value:.4g} N/m (+- {stiffness.std:.2g}) joins {first} and {second}; "
-            "the model lacks it."
-        )
+        return f"A spring of {stiffness.in_words('N/m')} joins {first} and {second}; the model lacks it."
 
 
 def _stride(context: ModelContext) -> int:

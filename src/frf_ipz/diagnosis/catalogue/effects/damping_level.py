@@ -61,7 +61,7 @@ class DampingLevel(Effect):
         del location
         ratio = values["modal_ratio"]
         return (
-            f"All modes have a damping ratio of about {100 * ratio.value:.3g} % (+- {100 * ratio.std:.2g} %), not the "
+            f"All modes have a damping ratio of about {ratio.in_words('%', 100)}, not the "
             f"{100 * _stated(context):.3g} % of the model."
         )
 

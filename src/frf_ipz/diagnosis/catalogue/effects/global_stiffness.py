@@ -53,6 +53,6 @@ class GlobalStiffness(Effect):
         ratio = values["stiffness_ratio"]
         how = "stiffer" if ratio.value > 1 else "softer"
         return (
-            f"The whole structure is {100 * abs(ratio.value - 1):.3g} % (+- {100 * ratio.std:.2g} %) {how} than the "
+            f"The whole structure is {ratio.in_words('%', 100 if ratio.value > 1 else -100, less=1)} {how} than the "
             "model: a wrong Young's modulus, thickness or length."
         )

@@ -77,7 +77,7 @@ class GroundedSpring(Effect):
         stiffness = values["stiffness_N_m"]
         where = context.describe_node(int(str(location.key[0])))
         return (
-            f"A spring of {stiffness.value:.4g} N/m (+- {stiffness.std:.2g}) holds {where} "
+            f"A spring of {stiffness.in_words('N/m')} holds {where} "
             f"to {'something that hangs as softly as the structure' if is_floating(location) else 'the ground'}; "
             "the model lacks it."
         )

@@ -67,7 +67,7 @@ class LocalDamper(Effect):
         """Say how much, and where."""
         damping = values["damping_Ns_m"]
         return (
-            f"A damper of {damping.value:.4g} N s/m (+- {damping.std:.2g}) acts between "
+            f"A damper of {damping.in_words('N s/m')} acts between "
             f"{context.describe_node(int(str(location.key[0])))} and the ground."
         )
 

@@ -102,7 +102,7 @@ class LocalStiffness(Effect):
         ratio = values["stiffness_ratio"]
         how = "stiffer" if ratio.value > 1 else "softer"
         return (
-            f"{_name_part(context, location)} {100 * abs(ratio.value - 1):.3g} % (+- {100 * ratio.std:.2g} %) {how} "
+            f"{_name_part(context, location)} {ratio.in_words('%', 100 if ratio.value > 1 else -100, less=1)} {how} "
             "than in the model."
         )
 

@@ -58,10 +58,7 @@ class SensorDynamics(Effect):
         """Say which channel, which filter."""
         del context
         corner = values["corner_hz"]
-        return (
-            f"The channel '{location.key[0]}' has a {location.key[1]} with its corner at {corner.value:.4g} Hz "
-            f"(+- {corner.std:.2g} Hz)."
-        )
+        return f"The channel '{location.key[0]}' has a {location.key[1]} with its corner at {corner.in_words('Hz')}."
 
 
 def first_order(s: ComplexArray, kind: str, corner_hz: float) -> ComplexArray:

@@ -66,5 +66,5 @@ class SensorGain(Effect):
         del context
         ratio = values["gain_ratio"]
         sign = " and has the wrong sign" if ratio.value < 0 else ""
-        size = f"{abs(ratio.value):.4g} (+- {ratio.std:.2g})"
-        return f"The channel '{location.key[0]}' shows {size} times the true signal{sign}."
+        size = ratio.in_words("times", -1.0 if ratio.value < 0 else 1.0)
+        return f"The channel '{location.key[0]}' shows {size} the true signal{sign}."

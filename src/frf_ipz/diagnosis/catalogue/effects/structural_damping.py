@@ -66,7 +66,4 @@ class StructuralDamping(Effect):
         """Say how much."""
         del context, location
         loss = values["loss_factor"]
-        return (
-            f"The material has a loss factor of {loss.value:.3g} (+- {loss.std:.2g}), of all stiffness and besides "
-            "the model's damping."
-        )
+        return f"The material has a loss factor of {loss.in_words()}, of all stiffness and besides the model's damping."

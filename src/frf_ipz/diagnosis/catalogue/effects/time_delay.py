@@ -62,7 +62,7 @@ class TimeDelay(Effect):
         """Say which channel, and by how much."""
         del context
         delay = values["delay_s"]
-        late = f"late by {1e6 * delay.value:.4g} us (+- {1e6 * delay.std:.2g} us)"
+        late = f"late by {delay.in_words('us', 1e6)}"
         if len(location.key) == 1:
             return f"The channel '{location.key[0]}' is {late}."
         return f"All sensors together are {late}."

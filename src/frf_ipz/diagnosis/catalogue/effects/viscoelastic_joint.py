@@ -117,9 +117,10 @@ class ViscoelasticJoint(Effect):
         }[str(location.key[0])]()
         name, stiffness = next(iter(values.items()))
         unit = "N m/rad" if name.startswith("rot") else "N/m"
+        relaxation = values["relaxation_time_s"].in_words("ms", 1e3)
         return (
-            f"A viscoelastic joint acts {where} that the model lacks: its stiffness is {stiffness.value:.4g} {unit} at "
-            f"high frequencies and 0 at low ones, its relaxation time {1e3 * values['relaxation_time_s'].value:.3g} ms."
+            f"A viscoelastic joint acts {where} that the model lacks: its stiffness is {stiffness.in_words(unit)} at "
+            f"high frequencies and 0 at low ones, its relaxation time {relaxation}."
         )
 
 
