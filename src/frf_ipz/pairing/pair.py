@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.frf import FrfLabel
 
-SURE = 0.95  # probability from which a pair becomes a target: a wrong one costs the update more than a missing one
+SURE = 0.8  # probability from which a pair becomes a target: a wrong one costs the update some four times a missing one
 HARDLY_OBSERVABLE = 0.05  # amplitude over the mean amplitude, in every FRF, below which a mode need not show
 CANCELLING = 3.0  # standard deviations of distance below which a zero and a pole cannot be distinguished
 NO_ROOT = complex(np.nan, np.nan)

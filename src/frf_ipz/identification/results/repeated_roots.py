@@ -49,7 +49,7 @@ def with_repeated_roots(fit: ModalFit) -> ModalFit:
     products[:, rows, columns] = fit.model.residues[: fit.n_modes] * factors
     variance = np.ones((fit.n_modes, *shape))
     variance[:, rows, columns] = np.trace(fit.residue_covariance, axis1=2, axis2=3) * np.abs(factors) ** 2
-    if not variance.all():  # an FRF of zeros, without any error, is no measurement and weighs without bounds
+    if not products.all():  # an FRF of zeros is no measurement: it has no error, and would weigh without bounds
         return fit
     repeated = _of_rank_two(products, variance, len(fit.frequency_hz))
     driving = [(outputs.index(dof), inputs.index(dof)) for dof in outputs if dof in inputs]
