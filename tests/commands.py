@@ -121,6 +121,12 @@ def command_line(*arguments):
     main()
 
 
+def patient(*arguments):
+    """``frf-ipz`` with these arguments; it waits for another command however slow the machine is."""
+    folder_lock.WAIT_S = LONGEST_S
+    command_line(*arguments)
+
+
 def impatient(*arguments):
     """``frf-ipz`` with these arguments; where another command is at work it does not wait."""
     folder_lock.WAIT_S = 0.0

@@ -12,7 +12,7 @@ TEMPLATES = [path for area in ("report", "show") for path in sorted((SOURCE / ar
 TAG = re.compile(r"</?[a-zA-Z][\w-]*(?:[\s/>]|$)|<!|&\w+;")
 # Tags of Plotly's texts, which know no scripts; what their own signs become in them; a type of NumPy's.
 NO_HTML = ("<br>", "<extra>", "</extra>", "&amp;", "&lt;", "&gt;", "<f4")
-MARKED_AS_SAFE = {"style", "script"}
+MARKED_AS_SAFE = {"style", "margins", "script"}
 
 
 def texts(tree):

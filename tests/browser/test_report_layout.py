@@ -7,7 +7,7 @@ import pytest
 
 from frf_ipz.report.page import write_report
 from frf_ipz.runs.results import Results
-from opened_page import errors, open_page
+from opened_page import errors, open_page, wait_for
 from synthetic_run import synthetic_folder
 
 pytestmark = pytest.mark.browser
@@ -166,6 +166,18 @@ def test_the_summary_fills_the_first_two_printed_pages(page):
     assert end - next_page <= PAPER_PX[1]
     assert breaks == ["page", "page"]
     assert set(cuts) == {"avoid"}
+
+
+def test_a_browser_that_cannot_unpack_the_library_says_so_and_shows_the_tables(browser, written):
+    old = browser.execute_cdp_cmd(
+        "Page.addScriptToEvaluateOnNewDocument", {"source": "delete window.DecompressionStream;"}
+    )
+    try:
+        browser.get(written.as_uri())
+        wait_for(browser, "return document.querySelector('.plot').textContent.includes('too old to draw')")
+        assert browser.find_element("css selector", "#state-space table").is_displayed()
+    finally:
+        browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", {"identifier": old["identifier"]})
 
 
 @pytest.mark.parametrize("width", [1280, 390])

@@ -56,7 +56,8 @@ class Campaign:
             "plot": (self.out, "fit", "--out", self.folder / f"{place}.svg"),
             "show": (self.out, "--no-browser", "--port", "0"),
         }.get(verb, (self.pipelines[place], "--out", self.out))
-        return commands.Command(verb, *arguments, log=self.folder / f"log_{place}", within=self.out)
+        log = self.folder / f"log_{place}"
+        return commands.Command(verb, *arguments, work=commands.patient, log=log, within=self.out)
 
     def faults(self):
         """What is wrong with the folder: litter, a file of another run, or stages of two pipelines as one result."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from frf_ipz.assessment.assessment import Assessment, Check
 from frf_ipz.assessment.causes.cause import Situation
-from frf_ipz.assessment.causes.columns import find_exchanged_columns
+from frf_ipz.assessment.causes.columns import find_exchanged_columns, find_inverted_columns
 from frf_ipz.assessment.causes.likely_cause import find_likely_cause
 from frf_ipz.assessment.causes.modal_comparison import computed_modes, measured_modes
 from frf_ipz.assessment.checks import agreement, counterparts, prediction, quality
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from frf_ipz.assessment.assessment import LikelyCause
     from frf_ipz.assessment.causes.modal_comparison import MeasuredModes
     from frf_ipz.assessment.evidence import Evidence
+    from frf_ipz.frf import FrfSet
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.ingest.frf_estimate import Trace
     from frf_ipz.structure import StructuralModel
 
 Ask: TypeAlias = "Callable[[Evidence], Iterator[Check]]"
@@ -56,34 +59,65 @@ def assess(evidence: Evidence) -> Assessment:
         Verdict, checks and likely cause.
     """
     checks = [check for ask in CHECKS for check in ask(evidence)]
+    cause = likely_cause(
+        evidence.frfs,
+        evidence.fit,
+        evidence.fe_model,
+        impacts=evidence.impacts,
+        is_recorded=evidence.is_recorded,
+        test_file=evidence.test_file,
+        model_file=evidence.model_file,
+    )
     deviations = tuple(found for found in (evidence.point_deviation, evidence.deviation) if found is not None)
-    return Assessment.of_checks(checks, likely_cause(evidence), deviations=deviations)
+    return Assessment.of_checks(checks, cause, deviations=deviations)
 
 
-def likely_cause(evidence: Evidence) -> LikelyCause | None:
+def likely_cause(
+    frfs: FrfSet,
+    fit: ModalFit,
+    fe_model: StructuralModel,
+    *,
+    impacts: tuple[Trace, ...] = (),
+    is_recorded: bool,
+    test_file: str,
+    model_file: str,
+) -> LikelyCause | None:
     """Look for a mistake that explains how measured and computed modes differ.
 
     Parameters
     ----------
-    evidence : Evidence
-        The results of the run.
+    frfs : FrfSet
+        As measured.
+    fit : ModalFit
+        The fitted model.
+    fe_model : StructuralModel
+        As the user handed it in.
+    impacts : tuple of Trace
+        Forces and responses of a hammer's impacts; empty for other tests.
+    is_recorded : bool
+        The FRFs were estimated from columns of recordings.
+    test_file, model_file : str
+        Where a mistake would stand.
 
     Returns
     -------
     LikelyCause or None
         None where no mistake is more likely than not.
     """
-    exchanged = find_exchanged_columns(evidence.impacts, evidence.frfs.labels, test_file=evidence.test_file)
+    exchanged = find_exchanged_columns(impacts, frfs.labels, test_file=test_file)
     if exchanged is not None:
         return exchanged
     situation = compare_modes(
-        measured_modes(evidence.fit), evidence.fe_model, test_file=evidence.test_file, model_file=evidence.model_file
+        measured_modes(fit), fe_model, test_file=test_file, model_file=model_file, is_recorded=is_recorded
     )
-    return None if situation is None else find_likely_cause(situation)
+    if situation is None:
+        return None
+    named = find_likely_cause(situation)
+    return find_inverted_columns(frfs, situation) if named is None and is_recorded and not impacts else named
 
 
 def compare_modes(
-    measured: MeasuredModes, model: StructuralModel, *, test_file: str, model_file: str
+    measured: MeasuredModes, model: StructuralModel, *, test_file: str, model_file: str, is_recorded: bool
 ) -> Situation | None:
     """Set the modes of an FE model beside measured ones, to look for a mistake.
 
@@ -95,6 +129,8 @@ def compare_modes(
         The FE model as the user handed it in.
     test_file, model_file : str
         Names of the files that a mistake may stand in.
+    is_recorded : bool
+        The FRFs were estimated from columns of recordings.
 
     Returns
     -------
@@ -112,4 +148,5 @@ def compare_modes(
         model=model,
         test_file=test_file,
         model_file=model_file,
+        is_recorded=is_recorded,
     )

@@ -47,8 +47,12 @@ class Evidence(MeasuredPoints):
         What the FE model left out; None where it was not looked for.
     with_causes : Prediction, optional
         Of a model that has what the diagnosis found.
+    is_corrected : bool
+        What the diagnosis found is in the model that predicts.
     impacts : tuple of Trace
         Forces and responses of a hammer's impacts; empty for other tests.
+    is_recorded : bool
+        The FRFs were estimated from columns of recordings.
     test_file, model_file : str
         Where a mistake would stand.
     """
@@ -59,7 +63,9 @@ class Evidence(MeasuredPoints):
     reference: FrfSet | None = None
     diagnosis: Diagnosis | None = None
     with_causes: Prediction | None = None
+    is_corrected: bool = False
     impacts: tuple[Trace, ...] = ()
+    is_recorded: bool = False
     test_file: str = "test.toml"
     model_file: str = "model.toml"
 

@@ -43,8 +43,9 @@ class MeasuredPoints:
 
     @cached_property
     def measured(self) -> ComplexArray:
-        """(n_lines, n_frfs) measured FRFs on these lines."""
-        return np.asarray(self.frfs.values[self.lines])
+        """(n_lines, n_frfs) measured FRFs on these lines, without the delay that was fitted."""
+        late = np.exp(self.frfs.s[self.lines, None] * self.fit.model.delay_s)
+        return np.asarray(self.frfs.values[self.lines] * late)
 
     @cached_property
     def noise(self) -> FloatArray:
@@ -53,7 +54,7 @@ class MeasuredPoints:
         Where the recordings do not tell, what the fit leaves over stands in for it.
         """
         stated = np.sqrt(self.frfs.variance[self.lines])
-        left_over = np.abs(self.measured - self.fit.model(self.frfs.s[self.lines]))
+        left_over = np.abs(self.frfs.values[self.lines] - self.fit.model(self.frfs.s[self.lines]))
         known = np.isfinite(stated)
         return np.where(known, np.where(known, stated, 0.0), np.sqrt(np.mean(left_over**2, axis=0)))
 

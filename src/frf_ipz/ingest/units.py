@@ -24,6 +24,7 @@ EXAMPLES = {
     "displacement": "m, mm or um",
     "time": "s or ms",
 }
+MOTIONS = ("acceleration", "velocity", "displacement")
 UNREADABLE = (
     pint.PintError,
     ArithmeticError,
@@ -389,8 +390,10 @@ def _convert(value: pint.Quantity[float], si: str, problem: str, quantity: str) 
     try:
         factor = float(value.to(si).magnitude)
     except pint.PintError:
-        hint = EXAMPLES.get(quantity, "")
-        raise QuantityError(f"{problem}; expected is {hint or f'a unit like {si}'}") from None
+        hint = EXAMPLES.get(quantity) or f"a unit like {si}"
+        other = [name for name in MOTIONS if quantity in MOTIONS and value.is_compatible_with(si_unit(name))]
+        instead = f', or quantity = "{other[0]}"' if other else ""
+        raise QuantityError(f"{problem}; expected is {hint}{instead}") from None
     if not math.isfinite(factor) or factor == 0.0:
         raise QuantityError(f"{problem}: it is {factor:g} {si}; write a unit, without a number that is zero or NaN")
     return factor

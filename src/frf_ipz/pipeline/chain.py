@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.pipeline.stage_runner import StageRunner
-from frf_ipz.pipeline.stages import causes, measurement, mismatch, modelling, outputs
+from frf_ipz.pipeline.stages import causes, hints, measurement, mismatch, modelling, outputs
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -70,25 +70,26 @@ def chain(
             if until == "diagnose":
                 outputs.report(runner)
             yield "diagnose"
-        reduced = modelling.reduce(runner, model, fit, corrected_by=diagnosis)
-        pairs = modelling.pair(runner, fit, reduced)
-        yield "pair"
-        updated = modelling.update(runner, model, reduced, fit, pairs, corrected_by=diagnosis)
-        yield "update"
-        prediction = outputs.predict(runner, updated, fit, frfs)
-        with_causes = None if found is None else causes.predict_with_causes(runner, model, frfs, found, prediction)
-        outputs.assess(
-            runner,
-            frfs,
-            recordings.traces,
-            fit,
-            model,
-            pairs,
-            updated,
-            prediction,
-            diagnosis=found if diagnosis is None else diagnosis,
-            with_causes=with_causes,
-        )
+        with hints.naming_the_cause(inputs, recordings, fit, model):
+            reduced = modelling.reduce(runner, model, fit, corrected_by=diagnosis)
+            pairs = modelling.pair(runner, fit, reduced)
+            yield "pair"
+            updated = modelling.update(runner, model, reduced, fit, pairs, corrected_by=diagnosis)
+            yield "update"
+            prediction = outputs.predict(runner, updated, fit, frfs)
+            with_causes = None if found is None else causes.predict_with_causes(runner, model, frfs, found, prediction)
+            outputs.assess(
+                runner,
+                frfs,
+                recordings.traces,
+                fit,
+                model,
+                pairs,
+                updated,
+                prediction,
+                diagnosis=found if diagnosis is None else diagnosis,
+                with_causes=with_causes,
+            )
         yield "predict"
         outputs.export(runner, updated, fit, corrected_by=diagnosis)
         yield "export"

@@ -5,8 +5,7 @@ the fit, is divided by the size of the FRF: the sum of the moduli of its modes' 
 zeros. The mean square over the measured FRFs is the relative size of the error there; that of an FRF which was not
 measured is as large in relation to its own size. The mean square of n independent complex numbers is uncertain by
 itself, so that the error has a Student distribution with 2 n degrees of freedom; n is the number of sensors or of
-excited DOFs, whichever are fewer, for what is wrong at one of them is so in all its FRFs. A factor common to all FRFs
-is no part of it: that is a doubt of the model's mass, which the draws of the scale carry.
+excited DOFs, whichever are fewer, for what is wrong at one of them is so in all its FRFs.
 
 [Kennedy2001]: M. C. Kennedy, A. O'Hagan, Bayesian calibration of computer models, Journal of the Royal Statistical
 Society B 63 (2001) 425-464 (doi:10.1111/1467-9868.00294), for a discrepancy beside the parameters.
@@ -88,7 +87,7 @@ def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEn
         0 where the ensemble and the noise explain what is missed.
     """
     scale = updated.scale
-    measured = fit.model(s) / (scale.gains(fit.labels) if scale.is_relative else scale.level * fit.gain)
+    measured = fit.model(s) / (scale.gains(fit.labels) if scale.is_relative else fit.gain)
     centre = as_ensemble(updated, ensemble.lowest_rad_s)
     lines_hz = np.abs(s) / (2 * np.pi)
     power = np.zeros(len(s))

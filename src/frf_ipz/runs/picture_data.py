@@ -166,7 +166,7 @@ def models_beside_measurement(run: Results) -> ModelsBesideMeasurement | None:
         measured=measured,
         nominal=nominal,
         updated=updated,
-        has_fitted_gains=run.updated_model.scale.is_fitted,
+        has_fitted_gains=run.updated_model.scale.is_relative and run.updated_model.scale.is_fitted,
     )
 
 

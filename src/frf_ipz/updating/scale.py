@@ -41,7 +41,7 @@ DRAWS = 200  # without an ensemble
 DECIBEL = 20 / np.log(10.0)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class MeasuredScale:
     """Gains of measured FRFs over a model: 1 where the test knows its scale.
 
@@ -88,6 +88,9 @@ class MeasuredScale:
     sign: FloatArray = field(default_factory=lambda: np.zeros(0))
     draws: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     level: float = 1.0
+
+    def __repr__(self) -> str:
+        return f"MeasuredScale: {self.kind}, {len(self.labels)} FRFs, {len(self.draws)} draws"
 
     @property
     def is_relative(self) -> bool:
@@ -411,16 +414,17 @@ def _estimator(design: FloatArray, variance: FloatArray) -> FloatArray:
 
 
 def _unexplained(data: FloatArray, design: FloatArray, known: FloatArray, relative: FloatArray, degrees: int) -> float:
-    """Variance, over `relative`, with which the scatter is what is expected ([Paule1982]); 0 where it is no larger."""
+    """Variance, over `relative`, with which the scatter is as expected ([Paule1982]); next to none where it is less."""
 
     def surplus(excess: float) -> float:
         variance = known + excess * relative
         error = data - design @ (_estimator(design, variance) @ data)
         return float(np.sum(error**2 / variance) - degrees)
 
-    floor = float(np.max(known)) * np.finfo(float).eps
+    eps = float(np.finfo(float).eps)
+    floor = eps * float(np.max(known) + np.mean(data**2) + eps)  # above 0 where neither noise nor scatter is
     if surplus(floor) <= 0:
-        return 0.0
+        return floor
     top = float(np.sum(data**2) + floor)
     while surplus(top) > 0:
         top *= 2.0

@@ -117,8 +117,9 @@ def predict_left_out(beam: BeamTest, node: int) -> pd.DataFrame:
         "measured poles, nominal shapes": frf_ipz.shift_to_measured_poles(pairs, reduced_model),
         "updated": updated.model,
     }
+    late = np.exp(-left_out.s * np.median(fit.model.delay_s))[:, None]  # what was left out is as late as the rest
     rows = {
-        name: assess_agreement(left_out.values, frf_ipz.compute_frfs(model, left_out.labels, left_out.s))
+        name: assess_agreement(left_out.values, late * frf_ipz.compute_frfs(model, left_out.labels, left_out.s))
         for name, model in models.items()
     }
     return pd.DataFrame(rows).T.rename_axis("model").assign(status=updated.status.name, targets=len(pairs.targets))

@@ -87,6 +87,24 @@ def test_a_phase_that_is_off_is_seen_at_its_frf(evidence, degrees, verdict, is_r
     assert ("its sign is reversed" in check.says) == ("turn the sign" in check.advice) == is_reversed
 
 
+@pytest.mark.parametrize("delay_s", [2e-3, -1e-3])
+def test_a_delay_is_no_reversed_sign(evidence, delay_s):
+    """Over a band of 700 Hz 2 ms are 500 degrees: half of the lines look reversed."""
+    late = np.exp(-2j * np.pi * LINES * delay_s)[:, None]
+    check = the(agreement.phase, replace(evidence, frfs=replace(evidence.frfs, values=evidence.frfs.values * late)))
+    assert check.verdict is NOT_USABLE
+    assert f"a delay of {1e3 * delay_s:.2g} ms that all FRFs have in common" in check.says
+    assert "[fit] delay" in check.advice
+    assert "reversed" not in check.says
+
+
+def test_a_delay_that_was_fitted_is_no_error_of_phase(evidence):
+    late = np.exp(-2j * np.pi * LINES * 2e-3)[:, None]
+    fitted = replace(evidence.fit, model=replace(evidence.fit.model, delay_s=np.full(len(OUTPUTS), 2e-3)))
+    frfs = replace(evidence.frfs, values=evidence.frfs.values * late)
+    assert the(agreement.phase, replace(evidence, frfs=frfs, fit=fitted)).verdict is USABLE
+
+
 def test_an_update_that_made_it_worse_is_seen(evidence):
     assert the(agreement.improvement, evidence).verdict is USABLE
     updated = evidence.updated_model
@@ -212,15 +230,21 @@ def test_a_common_gain_leaves_predictions_usable_in_the_unit_of_the_measurement(
 
 
 @pytest.mark.parametrize(
-    ("found", "verdict"),
-    [(None, USABLE), ("consistent", USABLE), ("explained", USABLE), ("unexplained", WITH_CARE)],
+    ("found", "is_corrected", "verdict"),
+    [
+        (None, False, USABLE),
+        ("consistent", False, USABLE),
+        ("explained", True, USABLE),
+        ("explained", False, WITH_CARE),  # the prediction is made without what was found
+        ("unexplained", False, WITH_CARE),
+    ],
 )
-def test_what_a_diagnosis_found_is_said(evidence, found, verdict):
+def test_what_a_diagnosis_found_is_said(evidence, found, is_corrected, verdict):
     class Found:
         pass
 
     Found.verdict = found
-    check = the(quality.diagnosis, replace(evidence, diagnosis=None if found is None else Found()))
+    check = the(quality.diagnosis, replace(evidence, is_corrected=is_corrected, diagnosis=found and Found()))
     assert check.verdict is verdict
     assert ("not looked for" in check.says) == (found is None)
 

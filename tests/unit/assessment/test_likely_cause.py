@@ -7,6 +7,7 @@ import pytest
 
 import frf_ipz
 from clamped_beam import BEAM
+from frf_ipz.assessment.assess import likely_cause
 from frf_ipz.assessment.causes.cause import Situation
 from frf_ipz.assessment.causes.likely_cause import find_likely_cause
 from frf_ipz.assessment.causes.modal_comparison import computed_modes, measured_modes
@@ -121,6 +122,58 @@ def test_exchanged_places_are_named(fit, labels, words):
     assert words in cause_of(fit, labels=labels).says
 
 
+def test_places_are_exchanged_with_their_signs(fit):
+    """The sensor at node 21 looks down, and somebody has taken it for the one at node 8."""
+    labels = relabelled(outputs={"8:+z": "21:-z", "21:+z": "8:+z"})
+    signs = np.array([1.0 if label.output_dof.node == 15 else -1.0 for label in FRF])
+    assert "sensors at 21:z and 8:z are exchanged" in cause_of(fit, labels=labels, gain=signs).says
+
+
+def test_false_modes_of_a_fit_hide_no_mistake(fit):
+    """Two of them a mode, a thousand times smaller, as fits leave them in noisy bands."""
+    measured = measured_modes(fit)
+    false_hz = np.concatenate([measured.frequency_hz * 0.93, measured.frequency_hz * 1.08])
+    count = 3 * len(measured.frequency_hz)
+    beam = frf_ipz.make_beam(**{**BEAM, "youngs_modulus_Pa": 210e9})
+    situation = Situation(
+        measured=replace(
+            measured,
+            frequency_hz=np.concatenate([measured.frequency_hz, false_hz]),
+            products=np.concatenate([measured.products, *(2 * [1e-3 * measured.products])]),
+            deviations=np.resize(measured.deviations, (count, len(FRF))),
+        ),
+        computed=computed_modes(frf_ipz.solve_modes(beam, n_modes=20)),
+        model=beam,
+        test_file="test.toml",
+        model_file="model.toml",
+    )
+    assert "youngs_modulus_Pa" in find_likely_cause(situation).line_or_key
+
+
+def read_as_the_force(frfs, column):
+    """FRFs where a response and the force are exchanged: its own is inverted, the others are transmissibilities."""
+    own = {label.input_dof: place for place, label in enumerate(FRF) if label.output_channel == column}
+    inverse = [own[label.input_dof] for label in FRF]
+    is_own = np.array([label.output_channel == column for label in FRF])
+    values = np.where(is_own, 1.0, frfs.values) / frfs.values[:, inverse]
+    relative = frfs.variance / np.abs(frfs.values) ** 2
+    return replace(frfs, values=values, variance=np.abs(values) ** 2 * (relative[:, inverse] + ~is_own * relative))
+
+
+@pytest.mark.parametrize("column", ["acc_0", None])
+def test_a_response_that_was_read_as_the_force_is_named(fit, column):
+    frfs = measure() if column is None else read_as_the_force(measure(), column)
+    wrong = frf_ipz.fit_modes(frfs, options=frf_ipz.FitOptions(band_hz=fit.band_hz))
+    beam = frf_ipz.make_beam(**BEAM)
+    files = {"test_file": "test.toml", "model_file": "model.toml"}
+    cause = likely_cause(frfs, wrong, beam, is_recorded=True, **files)
+    if column is None:
+        assert cause is None
+    else:
+        assert cause.line_or_key == "[[channel]] column = 'force' and column = 'acc_0'"
+    assert likely_cause(frfs, wrong, beam, is_recorded=False, **files) is None  # it has no columns
+
+
 def test_a_sensor_at_another_node_is_found_to_a_node(fit):
     cause = cause_of(fit, labels=relabelled(outputs={"15:+z": "4:+z"}))
     assert "'acc_1'" in cause.line_or_key
@@ -146,6 +199,17 @@ def test_a_wrong_number_of_the_model_is_named(fit, changed, key):
 def test_the_time_in_ms_is_named(fit):
     cause = cause_of(fit, frequency_factor=1e-3)
     assert "time is in ms" in cause.says
+
+
+@pytest.mark.parametrize("is_recorded", [True, False])
+def test_the_key_is_one_of_the_kind_of_test(fit, is_recorded):
+    """A test of estimated FRFs has no channels in its file."""
+    reversed_fit = replace(fit, model=replace(fit.model, residues=fit.model.residues * column_gain("acc_2", -1.0)))
+    files = {"test_file": "test.toml", "model_file": "model.toml"}
+    cause = likely_cause(measure(), reversed_fit, frf_ipz.make_beam(**BEAM), is_recorded=is_recorded, **files)
+    assert cause.line_or_key.startswith(
+        "[[channel]] column = 'acc_2': dof" if is_recorded else "[[frf]] of acc_2: output"
+    )
 
 
 def test_a_gain_that_no_unit_explains_is_no_cause(fit):

@@ -131,7 +131,11 @@ def test_units_of_frfs(unit, quantity, directions, factor):
         (lambda: frf_factor("m/s2/N", FrfQuantity.ACCELERANCE, "ry", "z"), "a unit like rad/s.2/N"),
         (lambda: frf_factor("g/N", FrfQuantity.ACCELERANCE, "ry", "z"), "a unit like rad/s.2/N"),
         (lambda: frf_factor("dB", FrfQuantity.ACCELERANCE, "z", "z"), "no unit"),
-        (lambda: unit_factor("mm", "velocity"), "'mm' is no unit of velocity; expected is m/s or mm/s"),
+        (
+            lambda: unit_factor("mm", "velocity"),
+            "'mm' is no unit of velocity; expected is m/s or mm/s, or quantity = \"displacement\"",
+        ),
+        (lambda: unit_factor("g", "displacement"), 'expected is m, mm or um, or quantity = "acceleration"'),
         (lambda: unit_factor("blub", "force"), "'blub' is no unit that can be read; write it as in N"),
         (lambda: unit_factor("m/", "force"), "no unit that can be read"),
         (lambda: sensitivity_factor("10 mV", "force"), "is no ratio of units"),

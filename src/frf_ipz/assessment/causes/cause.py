@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel
 
 
+EXPECTED_COST = 2 * np.log(2)  # of a datum whose error is drawn from Cauchy's distribution: the mean of log(1 + x^2)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Situation:
     """What is known when a cause is looked for.
@@ -30,6 +33,8 @@ class Situation:
         The FE model.
     test_file, model_file : str
         Names of the files that a mistake may stand in.
+    is_recorded : bool
+        The FRFs were estimated from columns of recordings; else the test names them in ``[[frf]]``.
     """
 
     measured: MeasuredModes
@@ -37,6 +42,28 @@ class Situation:
     model: StructuralModel
     test_file: str
     model_file: str
+    is_recorded: bool = True
+
+    def key_of(self, side: str, channel: str, key: str) -> str:
+        """Name the key of the test in which something is said of a channel.
+
+        Parameters
+        ----------
+        side : str
+            ``output`` or ``input``.
+        channel : str
+            Its name in the labels.
+        key : str
+            ``dof`` or ``unit``.
+
+        Returns
+        -------
+        str
+            Its section, the channel and the key.
+        """
+        if self.is_recorded:
+            return f"[[channel]] column = '{channel}': {key}"
+        return f"[[frf]] of {channel}: {f'{side}_dof (or in its file)' if key == 'dof' else key}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -75,6 +102,7 @@ class Cause:
     log_prior: float = 0.0
 
 
+NO_MISTAKE = Cause(says="", file="", line_or_key="")
 FindCauses: TypeAlias = Callable[[Situation], Iterable[Cause]]
 
 
@@ -95,6 +123,26 @@ def log_evidence(cause: Cause, situation: Situation) -> float:
     """
     frequency_hz, products = changed_modes(cause, situation)
     return log_likelihood(situation.measured, frequency_hz, products) + cause.log_prior
+
+
+def explains(cause: Cause, situation: Situation) -> bool:
+    """Tell whether the modes agree under a cause as those of a nearly right model do: the best of many may be bad.
+
+    Parameters
+    ----------
+    cause : Cause
+        The cause.
+    situation : Situation
+        Measurement and model.
+
+    Returns
+    -------
+    bool
+        True where the cost is at most what is expected of errors as large as their scales.
+    """
+    measured = situation.measured
+    cost = cause.log_prior - log_evidence(cause, situation)
+    return bool(cost <= EXPECTED_COST * (measured.products.size + len(measured.frequency_hz)))
 
 
 def changed_modes(cause: Cause, situation: Situation) -> tuple[np.ndarray, np.ndarray]:

@@ -54,9 +54,10 @@ def of_all_outputs(situation: Situation) -> Iterator[Cause]:
         One a factor.
     """
     prior = -np.log(len(OF_OUTPUTS))
+    section = "[[channel]]" if situation.is_recorded else "[[frf]]"
     for gain, text in OF_OUTPUTS.items():
         says = f"every response {text}"
-        yield _test_cause(situation, says, "[[channel]] unit of the outputs", gain=gain, log_prior=prior)
+        yield _test_cause(situation, says, f"{section} unit of the outputs", gain=gain, log_prior=prior)
 
 
 def of_the_force(situation: Situation) -> Iterator[Cause]:
@@ -76,7 +77,7 @@ def of_the_force(situation: Situation) -> Iterator[Cause]:
     for factor, text in OF_FORCE.items():
         column = situation.measured.labels[0].input_channel or "of the input"
         says = f"the force {text}"
-        key = f"[[channel]] column = '{column}': unit"
+        key = situation.key_of("input", column, "unit")
         yield _test_cause(situation, says, key, gain=1 / factor, log_prior=prior)
 
 
@@ -99,7 +100,7 @@ def of_one_output(situation: Situation) -> Iterator[Cause]:
     prior = -np.log(len(OF_OUTPUTS) * len(channels))
     for name, mask in channels.items():
         for gain, text in OF_OUTPUTS.items():
-            says, key = f"the channel '{name}' {text}", f"[[channel]] column = '{name}': unit"
+            says, key = f"the channel '{name}' {text}", situation.key_of("output", name, "unit")
             yield _test_cause(situation, says, key, gain=np.where(mask, gain, 1.0).astype(complex), log_prior=prior)
 
 
@@ -120,7 +121,7 @@ def of_signs(situation: Situation) -> Iterator[Cause]:
     prior = -np.log(len(channels) + len(points) + 1)
     for name, mask in channels.items():
         says = f"the sensor of '{name}' measures the other way round: turn the sign of its dof"
-        key = f"[[channel]] column = '{name}': dof"
+        key = situation.key_of("output", name, "dof")
         yield _test_cause(situation, says, key, gain=np.where(mask, -1.0, 1.0).astype(complex), log_prior=prior)
     for name, mask in points.items() if len(points) > 1 else ():
         says = f"the force at {name} acts the other way round: turn the sign of its dof"
@@ -144,8 +145,9 @@ def of_derivatives(situation: Situation) -> Iterator[Cause]:
     Cause
         One a number of derivatives.
     """
+    section = "[[channel]]" if situation.is_recorded else "[[frf]]"
     for power, text in DERIVATIVES.items():
-        key, prior = "[[channel]] quantity of the outputs", -np.log(len(DERIVATIVES))
+        key, prior = f"{section} quantity of the outputs", -np.log(len(DERIVATIVES))
         yield _test_cause(situation, f"every response {text}", key, power=power, log_prior=prior)
 
 

@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 
 from frf_ipz.assessment.assessment import LikelyCause
 from frf_ipz.assessment.causes import gains, materials, places, supports
-from frf_ipz.assessment.causes.cause import Cause, Situation, log_evidence
+from frf_ipz.assessment.causes.cause import NO_MISTAKE, Cause, Situation, explains, log_evidence
 from frf_ipz.assessment.causes.modal_comparison import unrelated_log_likelihood
 
 if TYPE_CHECKING:
@@ -35,8 +35,6 @@ KINDS: tuple[FindCauses, ...] = (
     supports.other_supports,
 )
 MORE_LIKELY_THAN_NOT = 0.5
-NO_MISTAKE = Cause(says="", file="", line_or_key="")
-EXPECTED_COST = 2 * np.log(2)  # of a datum whose error is drawn from Cauchy's distribution: the mean of log(1 + x^2)
 
 
 def find_likely_cause(situation: Situation) -> LikelyCause | None:
@@ -61,7 +59,7 @@ def find_likely_cause(situation: Situation) -> LikelyCause | None:
     probability = np.exp(logs - logsumexp(logs))
     if probability[2:].sum() <= MORE_LIKELY_THAN_NOT:
         return None
-    if not _explains(causes[int(np.argmax(probability[2:]))], situation):
+    if not explains(causes[int(np.argmax(probability[2:]))], situation):
         return None
     return _worded(causes, probability[2:])
 
@@ -79,14 +77,7 @@ def agrees(situation: Situation) -> bool:
     bool
         True where nothing has to be corrected to make them agree.
     """
-    return _explains(NO_MISTAKE, situation)
-
-
-def _explains(cause: Cause, situation: Situation) -> bool:
-    """Tell whether the modes agree under a cause as those of a nearly right model do: the best of many may be bad."""
-    measured = situation.measured
-    cost = cause.log_prior - log_evidence(cause, situation)
-    return bool(cost <= EXPECTED_COST * (measured.products.size + len(measured.frequency_hz)))
+    return explains(NO_MISTAKE, situation)
 
 
 def _worded(causes: list[Cause], probability: np.ndarray) -> LikelyCause:

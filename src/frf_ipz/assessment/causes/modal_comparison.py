@@ -186,23 +186,23 @@ def log_likelihood(measured: MeasuredModes, frequency_hz: FloatArray, products: 
         Natural logarithm; 0 where all agrees.
     """
     costs = _costs(measured, frequency_hz, products)
-    most = _cost_of_no_counterpart(products.shape[1])
-    rows, columns = _assign(costs, most)
-    alone = np.setdiff1d(np.arange(len(frequency_hz)), columns)
-    not_measured = np.minimum(_costs_of_silence(measured, frequency_hz[alone], products[alone]), most)
-    return float(-costs[rows, columns].sum() - (len(costs) - len(rows)) * most - not_measured.sum())
+    not_computed = _costs_of_absence(measured, measured.products)
+    rows, columns = _assign(costs, not_computed)
+    inside = (frequency_hz > measured.band_hz[0]) & (frequency_hz < measured.band_hz[1])
+    not_measured = inside * _costs_of_absence(measured, products)
+    alone = np.delete(not_computed, rows).sum() + np.delete(not_measured, columns).sum()
+    return float(-costs[rows, columns].sum() - alone)
 
 
-def _assign(costs: FloatArray, most: float) -> tuple[IntArray, IntArray]:
-    """Assign one to one; a measured mode that finds no computed one for less than `most` stays alone."""
-    alone = np.full((len(costs), len(costs)), most)
-    rows, columns = linear_sum_assignment(np.hstack([costs, alone]))
+def _assign(costs: FloatArray, alone: FloatArray) -> tuple[IntArray, IntArray]:
+    """Assign one to one; a measured mode that finds no computed one for less than it costs `alone` stays so."""
+    rows, columns = linear_sum_assignment(np.hstack([costs, np.tile(alone[:, None], len(costs))]))
     assigned = columns < costs.shape[1]
     return rows[assigned], columns[assigned]
 
 
 def _costs(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray) -> FloatArray:
-    """Costs of assigning each measured mode (rows) to each computed one (columns)."""
+    """Costs of assigning each measured mode (rows) to each computed one (columns); infinite to one that is far."""
     ratios = np.log(measured.frequency_hz[:, None] / frequency_hz)
     first, second = measured.products[:, None, :], products[None]
     sizes = np.sqrt((np.abs(first) ** 2 + np.abs(second) ** 2) / 2)
@@ -210,24 +210,47 @@ def _costs(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexA
     noise = measured.deviations[:, None, :]
     scales = np.sqrt((SHAPE_SCALE * np.hypot(sizes, SHAPE_SCALE * floor)) ** 2 + noise**2)
     errors = np.abs(first - second) / np.maximum(scales, np.finfo(float).tiny)
-    return np.asarray(np.log1p((ratios / FREQUENCY_SCALE) ** 2) + np.log1p(errors**2).sum(axis=2))
+    costs = np.log1p((ratios / FREQUENCY_SCALE) ** 2) + np.log1p(errors**2).sum(axis=2)
+    return np.where(np.abs(ratios) > FAR * FREQUENCY_SCALE, np.inf, costs)
 
 
-def _costs_of_silence(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray) -> FloatArray:
-    """Costs of computed modes that were not measured: nothing out of the band, little for one that hardly shows."""
-    inside = (frequency_hz > measured.band_hz[0]) & (frequency_hz < measured.band_hz[1])
+def _costs_of_absence(measured: MeasuredModes, products: ComplexArray) -> FloatArray:
+    """Costs of modes without a counterpart, measured ones or computed ones: little for one that hardly shows.
+
+    At most a mode is far in frequency, and its products of shapes are off by their own size. A false mode of a fit is
+    small beside the others.
+    """
+    visible = _visibility(measured, products)
+    shapes = np.minimum(np.log1p(visible**2).sum(axis=1), cost_of_own_size(products.shape[1]))
+    return np.asarray(np.log1p(FAR**2) * visible.max(axis=1).clip(max=1) + shapes)
+
+
+def _visibility(measured: MeasuredModes, products: ComplexArray) -> FloatArray:
+    """(n_modes, n_frfs) sizes of products beside what is off in those of a measured mode."""
     scale = SHAPE_SCALE * np.sqrt(np.mean(np.abs(measured.products) ** 2, axis=0))
-    visible = np.abs(products) / np.maximum(scale, np.finfo(float).tiny)
-    return np.asarray(inside * (np.log1p(FAR**2) * visible.max(axis=1).clip(max=1) + np.log1p(visible**2).sum(axis=1)))
+    return np.asarray(np.abs(products) / np.maximum(scale, np.finfo(float).tiny))
 
 
-def _cost_of_no_counterpart(n_frfs: int) -> float:
-    """Cost of a measured mode that is alone: far in frequency, and products of shapes off by their own size."""
-    return float(np.log1p(FAR**2) + n_frfs * np.log1p(1 / SHAPE_SCALE**2))
+def cost_of_own_size(n_frfs: int) -> float:
+    """Give the cost of products of shapes that are off by their own size.
+
+    Parameters
+    ----------
+    n_frfs : int
+        How many products a mode has.
+
+    Returns
+    -------
+    float
+        Of one mode.
+    """
+    return float(n_frfs * np.log1p(1 / SHAPE_SCALE**2))
 
 
 def unrelated_log_likelihood(measured: MeasuredModes) -> float:
     """Give the log likelihood where something else is wrong: shapes are off by their size, frequencies fit by chance.
+
+    Or a mode is a false one of the fit, which costs what it does without a counterpart.
 
     Parameters
     ----------
@@ -239,4 +262,5 @@ def unrelated_log_likelihood(measured: MeasuredModes) -> float:
     float
         Natural logarithm.
     """
-    return float(-measured.products.size * np.log1p(1 / SHAPE_SCALE**2))
+    off = np.minimum(_costs_of_absence(measured, measured.products), cost_of_own_size(measured.products.shape[1]))
+    return -float(off.sum())

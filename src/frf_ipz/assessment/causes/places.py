@@ -12,8 +12,9 @@ from frf_ipz.assessment.causes.cause import Cause
 from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
+    from frf_ipz.arrays import ComplexArray
     from frf_ipz.assessment.causes.cause import Situation
 
 
@@ -34,9 +35,10 @@ def exchanged_sensors(situation: Situation) -> Iterator[Cause]:
     pairs = list(combinations(outputs, 2))
     for first, second in pairs:
         says = f"the sensors at {first.name} and {second.name} are exchanged: exchange their dofs"
-        channels = " and ".join(f"'{_channel(situation, dof)}'" for dof in (first, second))
-        key = f"[[channel]] {channels}: dof"
-        yield _moved(situation, says, key, {first: second, second: first}, {}, len(pairs))
+        key = "; ".join(situation.key_of("output", _channel(situation, dof), "dof") for dof in (first, second))
+        moved = {first: second, second: first}
+        written = [label.output_dof for label in situation.measured.labels]
+        yield _moved(situation, says, key, moved, {}, len(pairs), gain=_gain_of_exchange(written, moved))
 
 
 def exchanged_inputs(situation: Situation) -> Iterator[Cause]:
@@ -57,7 +59,9 @@ def exchanged_inputs(situation: Situation) -> Iterator[Cause]:
     for first, second in pairs:
         says = f"the excited points {first.name} and {second.name} are exchanged: exchange their dofs"
         key = f"dof of {first.name} and {second.name} in [[hit]], [[record]] or [[frf]]"
-        yield _moved(situation, says, key, {}, {first: second, second: first}, len(pairs))
+        moved = {first: second, second: first}
+        written = [label.input_dof for label in situation.measured.labels]
+        yield _moved(situation, says, key, {}, moved, len(pairs), gain=_gain_of_exchange(written, moved))
 
 
 def misplaced_sensor(situation: Situation) -> Iterator[Cause]:
@@ -82,7 +86,7 @@ def misplaced_sensor(situation: Situation) -> Iterator[Cause]:
         for place in nodes:
             channel = _channel(situation, dof)
             says = f"the sensor of '{channel}' seems to sit near {place.name}, not at {dof.name}: correct its dof"
-            key = f"[[channel]] column = '{channel}': dof"
+            key = situation.key_of("output", channel, "dof")
             yield _moved(situation, says, key, {dof: place}, {}, count)
 
 
@@ -121,8 +125,22 @@ def mirrored(situation: Situation) -> Iterator[Cause]:
             yield _moved(situation, says, key, moved, moved, 3)
 
 
+def _gain_of_exchange(written: Sequence[Dof], moved: Mapping[Dof, Dof]) -> ComplexArray:
+    """Give the sign that an exchange leaves in each FRF: dofs are exchanged with their signs."""
+    signs = {dof.unsigned: dof.sign for dof in written}
+    first, second = (signs[dof] for dof in moved)
+    return np.array([first * second if dof.unsigned in moved else 1 for dof in written], complex)
+
+
 def _moved(
-    situation: Situation, says: str, key: str, outputs: Mapping[Dof, Dof], inputs: Mapping[Dof, Dof], count: int
+    situation: Situation,
+    says: str,
+    key: str,
+    outputs: Mapping[Dof, Dof],
+    inputs: Mapping[Dof, Dof],
+    count: int,
+    *,
+    gain: complex | ComplexArray = 1.0,
 ) -> Cause:
     return Cause(
         says=says,
@@ -130,6 +148,7 @@ def _moved(
         line_or_key=key,
         moved_outputs=outputs,
         moved_inputs=inputs,
+        gain=gain,
         log_prior=-float(np.log(max(count, 1))),
     )
 

@@ -13,16 +13,19 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from frf_ipz.assessment.assessment import Check, Verdict
 from frf_ipz.assessment.deviations import worst_median
 
 if TYPE_CHECKING:
+    from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
     from frf_ipz.assessment.evidence import Evidence
 
 GAIN_MARGIN_DB, PHASE_MARGIN_DEG = 6.0, 45.0
 HALF, SIXTH = 1 / 2, 1 / 6
 NORMAL_90 = 1.645  # standard deviations that hold 90 % of a normal distribution
+OVERSAMPLED = 4  # points of a transform between two that are independent: one of them is near its peak
 INSIDE = 0.75  # of the lines: of a 90 % band, a quarter outside is no chance
 MOSTLY_OUTSIDE = 0.25
 
@@ -71,24 +74,77 @@ def phase(evidence: Evidence) -> Iterator[Check]:
     Check
         One, where anything was measured above its noise.
     """
-    with np.errstate(invalid="ignore"):  # an FRF may be 0
-        angle = np.degrees(np.abs(np.angle(evidence.updated / evidence.measured)))
-    after, worst = worst_median(np.where(evidence.is_heard, angle, np.nan))
+    turned = _phasors(evidence)
+    after, worst = worst_median(np.where(evidence.is_heard, np.degrees(np.abs(np.angle(turned))), np.nan))
     if worst < 0:
         return
     where = str(evidence.frfs.labels[worst])
-    is_reversed = after > 180 * HALF
     says = f"the updated model is {after:.2g} degrees off the measured FRF {where} ({evidence.band_text}, median)"
+    verdict, advice = judge(after, SIXTH * PHASE_MARGIN_DEG, HALF * PHASE_MARGIN_DEG), ""
+    delay_s = common_delay(evidence.frfs.frequency_hz[evidence.lines], turned)
+    on_time = turned * np.exp(2j * np.pi * evidence.frfs.frequency_hz[evidence.lines, None] * delay_s)
+    is_late = _median_angle(on_time, evidence.is_heard) < HALF * _median_angle(turned, evidence.is_heard)
+    if verdict is not Verdict.USABLE and is_late:
+        says += f"; a delay of {1e3 * delay_s:.2g} ms that all FRFs have in common explains most of it"
+        advice = "correct what makes the responses late or early (filters, trigger), or set [fit] delay = true"
+    elif np.nansum(np.where(evidence.is_heard, turned, 0)[:, worst]).real < 0:
+        says += ": its sign is reversed"
+        advice = f"turn the sign of the sensor's or the input's dof of {where}"
     yield Check(
         name="phase at the measured points",
-        verdict=judge(after, SIXTH * PHASE_MARGIN_DEG, HALF * PHASE_MARGIN_DEG),
+        verdict=verdict,
         figure=after,
         limit=SIXTH * PHASE_MARGIN_DEG,
         unit="deg",
         where=where,
-        says=says + (": its sign is reversed" if is_reversed else ""),
-        advice=f"turn the sign of the sensor's or the input's dof of {where}" if is_reversed else "",
+        says=says,
+        advice=advice,
     )
+
+
+def common_delay(frequency_hz: FloatArray, turned: ComplexArray) -> float:
+    """Give the delay that all FRFs have in common, by the largest of the sums of their turned phasors.
+
+    Parameters
+    ----------
+    frequency_hz : (n_lines,) array
+        Lines, Hz.
+    turned : (n_lines, n_frfs) complex array
+        Measured FRFs over computed ones, of modulus 1; NaN where they are not known.
+
+    Returns
+    -------
+    float
+        Seconds; positive where the measured ones are late.
+    """
+    if len(frequency_hz) < 2:
+        return 0.0
+    step_hz = float(np.median(np.diff(frequency_hz)))
+    places = np.round((frequency_hz - frequency_hz[0]) / step_hz).astype(int)
+    count = OVERSAMPLED * (int(places[-1]) + 1)
+    on_grid = np.zeros((count, turned.shape[1]), complex)
+    on_grid[places] = np.nan_to_num(turned)
+    sums = np.abs(np.fft.ifft(on_grid, axis=0)).sum(axis=1)
+    delays_s = np.fft.fftfreq(count, step_hz)
+    near, apart = float(delays_s[np.argmax(sums)]), float(delays_s[1])
+    known = np.nan_to_num(turned)
+    omega = 2 * np.pi * frequency_hz[:, None]
+
+    def loss(delay_s: float) -> float:
+        return -float(np.abs((known * np.exp(1j * omega * delay_s)).sum(axis=0)).sum())
+
+    return float(minimize_scalar(loss, bounds=(near - apart, near + apart), method="bounded").x)
+
+
+def _phasors(evidence: Evidence) -> ComplexArray:
+    """(n_lines, n_frfs) measured over updated FRFs, of modulus 1; NaN where one of them is 0."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = evidence.measured / evidence.updated
+        return np.asarray(ratio / np.abs(ratio))
+
+
+def _median_angle(turned: ComplexArray, is_heard: BoolArray) -> float:
+    return float(np.nanmedian(np.where(is_heard, np.abs(np.angle(turned)), np.nan)))
 
 
 def improvement(evidence: Evidence) -> Iterator[Check]:

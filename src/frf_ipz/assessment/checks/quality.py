@@ -154,8 +154,12 @@ def diagnosis(evidence: Evidence) -> Iterator[Check]:
         advice = "see the section on the diagnosis"
     elif found.findings:
         names = ", ".join(f"{finding.effect.replace('_', ' ')} ({finding.confidence})" for finding in found.findings)
-        says, verdict = f"what is missing in the model was found: {names}", Verdict.USABLE
-        advice = "put it into the model, or set [diagnose] apply = true"
+        says, verdict, advice = f"what is missing in the model was found: {names}", Verdict.USABLE, ""
+        if evidence.is_corrected:
+            says += "; it was put into it"
+        else:
+            says, verdict = f"{says}; the prediction is made without it", Verdict.WITH_CARE
+            advice = "put it into the model, or set [diagnose] apply = true"
     else:
         says, verdict, advice = "nothing significant is missing in the model", Verdict.USABLE, ""
     yield Check(name="diagnosis", verdict=verdict, says=says, advice=advice)

@@ -56,7 +56,13 @@ def compare_with_model(inputs: PipelineInputs, estimate: FrfEstimate) -> Look:
     if exchanged is not None or inputs.fe_model is None:
         return Look(lines=(line,), open_points=tuple(_worded(exchanged)))
     measured = modes_of_peaks(peaks, labels)
-    situation = compare_modes(measured, inputs.fe_model, test_file=files.test, model_file=files.model)
+    situation = compare_modes(
+        measured,
+        inputs.fe_model,
+        test_file=files.test,
+        model_file=files.model,
+        is_recorded=inputs.test.kind != "frf",
+    )
     if situation is None:
         return Look(lines=(line,))
     beside = f"    model   {_listed(_in_band(situation))}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ from frf_ipz.pipeline.init.folder_contents import look_into
 from frf_ipz.pipeline.init.model_draft import draft_model
 from frf_ipz.pipeline.init.pipeline_draft import draft_pipeline
 from frf_ipz.pipeline.init.places import Places
+from frf_ipz.toml_files import parse_toml
 
 if TYPE_CHECKING:
     from frf_ipz.pipeline.init.folder_contents import FolderContents
@@ -76,8 +76,8 @@ def write_starting_files(folder: Path) -> StartingFiles:
 def _says_something(model: Path) -> bool:
     """Tell whether a model is more than a skeleton; what is damaged is something, and `check` says what."""
     try:
-        return bool(tomllib.loads(read_text(model)))
-    except (FileFormatError, tomllib.TOMLDecodeError):
+        return bool(parse_toml(read_text(model), model))
+    except FileFormatError:
         return True
 
 

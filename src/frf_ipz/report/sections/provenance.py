@@ -14,7 +14,8 @@ from frf_ipz.report.section import Listing, Section, Table
 if TYPE_CHECKING:
     from frf_ipz.runs.results import Results
 
-ABSOLUTE = re.compile(r"(?P<drive>[A-Za-z]:|)(?P<place>/.*)", re.DOTALL)
+ABSOLUTE = re.compile(r"([A-Za-z]:|)(/.*)", re.DOTALL)
+DRIVE, PLACE = 1, 2
 SHOWN_DIGITS = 16  # of a digest; all stand in run.json
 
 
@@ -98,11 +99,11 @@ def path_from(path: str, pipeline: str) -> str:
     given = ABSOLUTE.fullmatch(path.replace("\\", "/"))
     if given is None:
         return path
-    place = normpath(given["place"])
+    place = normpath(given[PLACE])
     start = ABSOLUTE.fullmatch(pipeline.replace("\\", "/"))
-    if start is None or start["drive"].lower() != given["drive"].lower():
+    if start is None or start[DRIVE].lower() != given[DRIVE].lower():
         return basename(place)
-    folder = dirname(normpath(start["place"]))
+    folder = dirname(normpath(start[PLACE]))
     return basename(place) if commonpath([place, folder]) == "/" else relpath(place, folder)
 
 

@@ -1,0 +1,61 @@
+"""What most likely has to be corrected, where numbers of a stage end in no result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from frf_ipz.assessment.assess import likely_cause
+from frf_ipz.errors import InputError, NumericalError
+from frf_ipz.pipeline.stages.outputs import places_of_mistakes
+
+if TYPE_CHECKING:
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
+    from frf_ipz.pipeline.inputs import PipelineInputs
+    from frf_ipz.structure import StructuralModel
+
+
+@contextmanager
+def naming_the_cause(
+    inputs: PipelineInputs, recordings: FrfEstimate, fit: ModalFit, fe_model: StructuralModel
+) -> Iterator[None]:
+    """Name the likely cause where a stage fails on numbers: a wrong unit of the model is an error of the input.
+
+    Parameters
+    ----------
+    inputs : PipelineInputs
+        What is worked on.
+    recordings : FrfEstimate
+        FRFs and recordings.
+    fit : ModalFit
+        The fitted model.
+    fe_model : StructuralModel
+        The FE model.
+
+    Yields
+    ------
+    None
+        While the stages after the fit are run.
+
+    Raises
+    ------
+    InputError
+        Where there is a likely cause; else the error of the stage goes on.
+    """
+    try:
+        yield
+    except NumericalError as error:
+        impacts = recordings.traces if inputs.test.kind == "hammer" else ()
+        cause = likely_cause(
+            recordings.frfs,
+            fit,
+            fe_model,
+            impacts=impacts,
+            is_recorded=inputs.test.kind != "frf",
+            **places_of_mistakes(inputs),
+        )
+        if cause is None:
+            raise
+        raise InputError(f"{inputs.source}: {error}; most likely {cause.says} ({cause.place})") from error
