@@ -45,10 +45,10 @@ class Evidence(MeasuredPoints):
         Measured FRFs at points of interest that were kept aside.
     diagnosis : Diagnosis, optional
         What the FE model left out; None where it was not looked for.
-    is_corrected : bool
-        What the diagnosis found is in the model that predicts.
     with_causes : Prediction, optional
         Of a model that has what the diagnosis found.
+    is_corrected : bool
+        What the diagnosis found is in the model that predicts.
     impacts : tuple of Trace
         Forces and responses of a hammer's impacts; empty for other tests.
     is_recorded : bool
@@ -62,8 +62,8 @@ class Evidence(MeasuredPoints):
     prediction: Prediction
     reference: FrfSet | None = None
     diagnosis: Diagnosis | None = None
-    is_corrected: bool = False
     with_causes: Prediction | None = None
+    is_corrected: bool = False
     impacts: tuple[Trace, ...] = ()
     is_recorded: bool = False
     test_file: str = "test.toml"

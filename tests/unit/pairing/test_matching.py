@@ -51,7 +51,8 @@ def test_a_sure_pair_is_sure_over_all_assignments(seed):
     found, exact = pair_probabilities(*given_costs), probabilities_by_trying(*given_costs)
     assert_allclose(found.sum(axis=1), 1.0, rtol=1e-12)
     sure = found >= SURE
-    assert (exact[sure] > SURE - 0.06).all()  # alternatives of the same best assignment count once
+    wrong = 1.0 - exact[sure]
+    assert (wrong < 2.2 * (1.0 - SURE)).all()  # alternatives of the same best assignment count once
     assert (found.argmax(axis=1)[sure.any(axis=1)] == exact.argmax(axis=1)[sure.any(axis=1)]).all()
 
 

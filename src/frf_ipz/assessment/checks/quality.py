@@ -152,13 +152,14 @@ def diagnosis(evidence: Evidence) -> Iterator[Check]:
     elif not found.is_explained:
         says, verdict = "something is missing in the model that no known effect explains", Verdict.WITH_CARE
         advice = "see the section on the diagnosis"
-    elif found.findings and evidence.is_corrected:
-        says, verdict, advice = "what is missing in the model was found, and put into it", Verdict.USABLE, ""
     elif found.findings:
         names = ", ".join(f"{finding.effect.replace('_', ' ')} ({finding.confidence})" for finding in found.findings)
-        says = f"what is missing in the model was found: {names}; the prediction is made without it"
-        verdict = Verdict.WITH_CARE
-        advice = "put it into the model, or set [diagnose] apply = true"
+        says, verdict, advice = f"what is missing in the model was found: {names}", Verdict.USABLE, ""
+        if evidence.is_corrected:
+            says += "; it was put into it"
+        else:
+            says, verdict = f"{says}; the prediction is made without it", Verdict.WITH_CARE
+            advice = "put it into the model, or set [diagnose] apply = true"
     else:
         says, verdict, advice = "nothing significant is missing in the model", Verdict.USABLE, ""
     yield Check(name="diagnosis", verdict=verdict, says=says, advice=advice)

@@ -134,7 +134,7 @@ def test_an_effect_that_leaves_half_is_not_tried_beside_a_law_that_strains_nothi
 def test_an_effect_is_searched_beside_the_law_where_the_opposite_order_led_to_nothing(
     monkeypatch, verdict, linear_first, searches
 ):
-    called, nothing = [], SimpleNamespace(findings=(), statement="")
+    called, nothing = [], SimpleNamespace(findings=(), statement="", is_explained=True)
     component = SimpleNamespace(log_evidence_gain=1.0, statement="")
 
     def first(*_):
