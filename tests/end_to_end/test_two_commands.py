@@ -1,6 +1,7 @@
 """Two commands at once in one folder: their results are never mixed, and stopping one loses nothing of the other."""
 
 import itertools
+import os
 import random
 import re
 import shutil
@@ -21,7 +22,7 @@ WRITERS = ("fit", "run", "diagnose", "export", "report")
 READERS = ("plot", "show")
 PAIRS = tuple(itertools.combinations_with_replacement((*WRITERS, *READERS), 2))
 SOME_PAIRS = (("run", "diagnose"), ("export", "show"), ("fit", "plot"))
-N_TRIALS = 10
+N_TRIALS = int(os.environ.get("TRIALS", "1"))  # of each pair; a long proof asks for 10
 QUICK_SEARCH = '[diagnose]\neffects = ["global_stiffness"]\n'
 N_CHANGES = 250  # of a command that writes everything; the other one begins, or it is stopped, after some of them
 STOPPED = 128 + signal.SIGINT

@@ -60,8 +60,9 @@ def pair_roots(fit: ModalFit, reduced_model: ReducedModel) -> Pairs:
     ... )
     >>> fit = frf_ipz.fit_modes(frfs)
     >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
-    >>> frf_ipz.pair_roots(fit, reduced_model)
-    Pairs: 3 of 3 measured poles, 3 of 7 measured zeros have a counterpart in the model
+    >>> pairs = frf_ipz.pair_roots(fit, reduced_model)
+    >>> pairs.count("zero").text
+    '3 of 7 measured zeros have a counterpart in the model, 4 are undecided'
     """
     require_type("fit", fit, ModalFit)
     require_type("reduced_model", reduced_model, ReducedModel)
