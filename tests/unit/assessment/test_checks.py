@@ -1,6 +1,7 @@
 """Each check sees what it is there for, says where, and leaves a sound run alone."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -229,24 +230,28 @@ def test_a_common_gain_leaves_predictions_usable_in_the_unit_of_the_measurement(
     assert check.figure == pytest.approx(20 * np.log10(2.0))
 
 
+MASS = frf_ipz.Finding(effect="added_mass", probability=0.98)
+
+
 @pytest.mark.parametrize(
-    ("found", "is_corrected", "verdict"),
+    ("is_explained", "findings", "is_corrected", "verdict", "says"),
     [
-        (None, False, USABLE),
-        ("consistent", False, USABLE),
-        ("explained", True, USABLE),
-        ("explained", False, WITH_CARE),  # the prediction is made without what was found
-        ("unexplained", False, WITH_CARE),
+        (True, (), False, USABLE, "nothing significant"),  # damping as measured is nothing missing
+        (True, (MASS,), True, USABLE, "was found: added mass (probability 0.98); it was put into it"),
+        (True, (MASS,), False, WITH_CARE, "was found: added mass (probability 0.98); the prediction is made without"),
+        (False, (MASS,), False, WITH_CARE, "no known effect explains"),
     ],
 )
-def test_what_a_diagnosis_found_is_said(evidence, found, is_corrected, verdict):
-    class Found:
-        pass
-
-    Found.verdict = found
-    check = the(quality.diagnosis, replace(evidence, is_corrected=is_corrected, diagnosis=found and Found()))
+def test_what_a_diagnosis_found_is_said(evidence, is_explained, findings, is_corrected, verdict, says):
+    found = SimpleNamespace(is_explained=is_explained, findings=findings)
+    check = the(quality.diagnosis, replace(evidence, is_corrected=is_corrected, diagnosis=found))
     assert check.verdict is verdict
-    assert ("not looked for" in check.says) == (found is None)
+    assert says in check.says
+
+
+def test_a_diagnosis_that_was_not_made_is_said(evidence):
+    check = the(quality.diagnosis, evidence)
+    assert (check.verdict, check.says) == (USABLE, "not looked for")
 
 
 def test_the_worst_check_stands_first():
