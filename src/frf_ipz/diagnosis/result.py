@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -245,11 +246,13 @@ def as_appearance(statement: str) -> str:
     Examples
     --------
     >>> as_appearance("A mass sits at node 3 (probability 0.97).")
-    'A part of it looks like this, and need not be: a mass sits at node 3 (probability 0.97).'
+    'A part of it looks like this, and need not be: a mass sits at node 3 (probability 0.97 among what was tried).'
     """
-    return f"{APPEARANCE}{statement[:1].lower()}{statement[1:]}"
+    relative = PROBABILITY.sub(r"(\1 among what was tried)", statement)  # what was not tried may be likelier
+    return f"{APPEARANCE}{relative[:1].lower()}{relative[1:]}"
 
 
+PROBABILITY = re.compile(r"\((probability [^()]*)\)")
 APPEARANCE = "A part of it looks like this, and need not be: "
 
 

@@ -78,4 +78,5 @@ def test_where_something_remains_a_part_only_looks_like_something(nominal):
     assert not diagnosis.is_explained
     assert diagnosis.findings
     assert all(finding.statement.startswith(APPEARANCE) for finding in diagnosis.findings)
+    assert all("among what was tried)" in finding.statement for finding in diagnosis.findings)
     assert diagnosis.statement.startswith("Something is missing that nothing in the catalogue explains: ")
