@@ -20,9 +20,9 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are c
 
 WRITERS = ("fit", "run", "diagnose", "export", "report")
 READERS = ("plot", "show")
-PAIRS = tuple(itertools.combinations_with_replacement((*WRITERS, *READERS), 2))
-SOME_PAIRS = (("run", "diagnose"), ("export", "show"), ("fit", "plot"))
 N_TRIALS = int(os.environ.get("TRIALS", "1"))  # of each pair; a long proof asks for 10
+PAIRS = tuple(itertools.combinations_with_replacement((*WRITERS, *READERS), 2))[:: 1 if N_TRIALS > 1 else 3]
+SOME_PAIRS = (("run", "diagnose"), ("export", "show"), ("fit", "plot"))
 QUICK_SEARCH = '[diagnose]\neffects = ["global_stiffness"]\n'
 N_CHANGES = 250  # of a command that writes everything; the other one begins, or it is stopped, after some of them
 STOPPED = 128 + signal.SIGINT
@@ -106,7 +106,7 @@ def at_once(campaign, verbs, rng, *, stopped=None):
 def judge(campaign, verbs, rng, *, stopped=None):
     statuses, said = at_once(campaign, verbs, rng, stopped=stopped)
     for place, verb in enumerate(verbs):
-        allowed = {STOPPED} if verb == "show" else {0, STOPPED} if place == stopped else {0}
+        allowed = {0, STOPPED} if verb == "show" else {0, STOPPED} if place == stopped else {0}
         assert statuses[place] in allowed, said[place]
     assert campaign.faults() == []
     keys = [results_of(campaign.out)[stage]["key"] for stage in ("ingest", "fit")]

@@ -207,6 +207,4 @@ def test_gains_and_bands_hold_over_many_campaigns(kind):
     assert 0.7 < np.sqrt(np.mean(scores**2)) < 1.4  # 40 campaigns tell this to 11 %
     assert 0.8 < np.mean(np.abs(scores) < NORMAL_90) <= 1.0
     least = {"common": 0.85, "per_channel": 0.8}[kind]  # 0.833 with a gain of each channel: 0.85 is wanted
-        kind
-    ]  # 0.833 with gains of each channel: short of the 0.85 that is wanted
     assert least <= np.mean([made.share_inside for made in campaigns]) <= 0.97
