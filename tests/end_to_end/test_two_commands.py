@@ -133,7 +133,7 @@ def test_all_pairs_of_commands_at_once_are_never_mixed(campaign, verbs):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("verbs", PAIRS, ids="-".join)
+@pytest.mark.parametrize("verbs", [verbs for verbs in PAIRS if "show" not in verbs], ids="-".join)
 def test_stopping_one_of_any_pair_loses_nothing_of_the_other(campaign, verbs):
     rng = random.Random("-".join(verbs))
     for trial in range(N_TRIALS):
