@@ -292,7 +292,7 @@ def test_one_damping_ratio_far_beyond_its_tolerance_is_not_consistent(nominal):
         observed(measured(true)), nominal, options=DiagnoseOptions(effects=("added_mass", "damping_level"))
     )
     assert diagnosis.verdict == "unexplained"
-    assert "0.35 % instead of 1 % at 287.1 Hz" in diagnosis.statement
+    assert "0.35 % at 287.1 Hz (model: 1 %)" in diagnosis.statement
     allowed = DiagnoseOptions(effects=("added_mass", "damping_level"), damping_tolerance=0.7)
     assert diagnose(observed(measured(true)), nominal, options=allowed).verdict == "consistent"
 
