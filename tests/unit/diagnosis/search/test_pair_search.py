@@ -186,8 +186,8 @@ def test_damping_that_nothing_explains_does_not_hide_a_mass(nominal):
         observed(measured(true)), nominal, options=DiagnoseOptions(effects=("added_mass", "damping_level"))
     )
     assert diagnosis.verdict == "unexplained"
-    assert "Damping is as measured, not as in the model" in diagnosis.statement
-    assert "4 % instead of 1 %" in diagnosis.statement
+    assert "Damping ratios are as measured, and nothing missing" in diagnosis.statement
+    assert "0.4 % at 99.88 Hz (model: 1 %)" in diagnosis.statement
     (finding,) = diagnosis.findings
     assert dict(finding.location) == {"nodes": [12]}
     assert finding.parameters["mass_kg"].value == pytest.approx(0.02, rel=SEEN)
