@@ -123,11 +123,9 @@ def to_options(table: Mapping[str, Any], options_type: type[Options], path: Path
     """
     kind: Any = options_type
     try:
-        options: Options = _adapter(kind).validate_python(dict(table))
+        return _adapter(kind).validate_python(dict(table))  # type: ignore[no-any-return]
     except ValidationError as error:
         problems = _problems(error, options_type)
-    else:
-        return options
     if len(problems) == 1:
         ((where, problem),) = problems.items()
         raise FileFormatError(path, problem, where=where)

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import frf_ipz
+from data_sets import data_set
 from fe_models import BEAM_TEXT, LUMPED_TEXT
 from frf_ipz.errors import FrfIpzError
 from frf_ipz.fe.matrices.dof_table import read_dof_table
@@ -34,16 +35,11 @@ DOFS = "node,direction,x_m,y_m,z_m\n1,z,0.0,0,0\n2,z,0.5,0,0\n3,z,1.0,0,0\n"
 
 
 def universal(kind):
-    head = [f"{kind:5d}         0    0         0       NONE         5   3       NONE         3   3"]
-    head += [f"         5{18:10d}         1{5.0:13.5e}{1.0:13.5e}{0.0:13.5e}"]
-    head += [f"{number:10d}    0    0    0 {name:<20s} {unit:<20s}" for number, name, unit in AXES]
-    rows = ["".join(f"{value:13.5e}" for value in range(6))] * (6 if kind == 4 else 3)
-    type_of_ordinates = 5 if kind == 4 else 2
-    head[1] = head[1].replace("         5", f"{type_of_ordinates:10d}", 1)
-    return "\n".join(["    -1", "    58", *["NONE"] * 5, *head, *rows, "    -1", ""])
+    values, ordinate_type = (np.tile([0 + 1j, 2 + 3j, 4 + 5j], 6), 5) if kind == 4 else (np.tile(np.arange(6.0), 3), 2)
+    return data_set(values, axes=AXES, kind=kind, ordinate_type=ordinate_type, start=5.0)
 
 
-AXES = ((18, "Frequency", "Hz"), (12, "force", "m/s2"), (13, "Force", "N"), (0, "NONE", "NONE"))
+AXES = ((18, "Frequency", "Hz"), (12, "force", "m/s2"), (13, "Force", "N"))
 
 
 def stage_file():

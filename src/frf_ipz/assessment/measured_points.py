@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.fe.response import compute_frfs
-
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
     from frf_ipz.frf import FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
 
@@ -71,12 +68,12 @@ class MeasuredPoints:
     @cached_property
     def updated(self) -> ComplexArray:
         """(n_lines, n_frfs) FRFs of the updated model at the measured points, in the unit of the measurement."""
-        return self._values(self.updated_model.model)
+        return self.updated_model.compute_frfs(self.frfs.labels, self.frfs.s[self.lines])
 
     @cached_property
     def nominal(self) -> ComplexArray:
         """(n_lines, n_frfs) FRFs of the model before updating at the measured points."""
-        return self._values(self.updated_model.nominal)
+        return self.updated_model.compute_frfs(self.frfs.labels, self.frfs.s[self.lines], nominal=True)
 
     @property
     def band_text(self) -> str:
@@ -100,7 +97,3 @@ class MeasuredPoints:
         with np.errstate(divide="ignore", invalid="ignore"):  # an FRF may be 0
             difference = np.abs(20 * np.log10(np.abs(values) / np.abs(self.measured)))
         return np.where(self.is_heard, difference, np.nan)
-
-    def _values(self, model: ReducedModel) -> ComplexArray:
-        values = compute_frfs(model, self.frfs.labels, self.frfs.s[self.lines])
-        return values * self.updated_model.scale_of(model).gains(self.frfs.labels)

@@ -10,11 +10,15 @@ from the cheapest one, as shortest paths along which rows hand on their columns 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 FORBIDDEN = 1e6  # cost of a pair that must not be
 
@@ -95,6 +99,49 @@ def pair_probabilities(costs: FloatArray, row_unmatched: FloatArray, column_unma
     excess = np.column_stack([excess[:, :n_columns], excess[:, n_columns:].min(axis=1)])
     likelihood = np.exp(-np.maximum(excess, 0.0) / 2)
     return np.asarray(likelihood / likelihood.sum(axis=1, keepdims=True))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Hypothesis:
+    """What costs may be, such as one scatter of the frequencies, and the cheapest assignment under it.
+
+    Parameters
+    ----------
+    matching : Matching
+        The cheapest assignment.
+    costs : (n, m) array
+        Of pairs.
+    unmatched : pair of (n,) and (m,) array
+        Costs of rows and of columns without a partner.
+    total : float
+        Minus twice the logarithm of how likely it is: the cost of the assignment, and what speaks against it besides.
+    """
+
+    matching: Matching
+    costs: FloatArray
+    unmatched: tuple[FloatArray, FloatArray]
+    total: float
+
+
+def mixed_probabilities(tried: Sequence[Hypothesis]) -> FloatArray:
+    """Give the probability of every pair, over all hypotheses.
+
+    Parameters
+    ----------
+    tried : sequence of Hypothesis
+        At least one.
+
+    Returns
+    -------
+    (n, m + 1) array
+        As `pair_probabilities` gives them.
+    """
+    totals = np.array([hypothesis.total for hypothesis in tried])
+    weights = np.exp(-(totals - totals.min()) / 2)
+    weights /= weights.sum()
+    shares = zip(weights.tolist(), tried, strict=True)
+    likely = [(weight, hypothesis) for weight, hypothesis in shares if weight > np.finfo(float).eps]
+    return np.asarray(sum(weight * pair_probabilities(each.costs, *each.unmatched) for weight, each in likely))
 
 
 def _with_unmatched(costs: FloatArray, row_unmatched: FloatArray, column_unmatched: FloatArray) -> FloatArray:

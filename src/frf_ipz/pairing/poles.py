@@ -15,7 +15,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.pairing.frequency_scatter import NARROWER, frequency_cost
-from frf_ipz.pairing.matching import Matching, match, pair_probabilities
+from frf_ipz.pairing.matching import Hypothesis, Matching, match, mixed_probabilities
 from frf_ipz.pairing.model_roots import ModelPoles
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def pair_poles(fit: ModalFit, model: ModelPoles) -> PolePairing:
     tried = _tried(measured, computed, shapes, band)
     return PolePairing(
         matching=tried[0].matching,
-        probabilities=_over_all(tried),
+        probabilities=mixed_probabilities(tried),
         costs=tried[0].costs,
         gains=gains,
     )
@@ -110,17 +110,7 @@ def measured_amplitudes(fit: ModalFit) -> tuple[ComplexArray, FloatArray]:
     return fit.model.residues[: fit.n_modes] * to_amplitude, std * np.abs(to_amplitude)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Hypothesis:
-    """One common factor with one scatter of the frequencies, and the cheapest assignment under it."""
-
-    matching: Matching
-    costs: FloatArray
-    unmatched: tuple[FloatArray, FloatArray]
-    total: float
-
-
-def _tried(measured: FloatArray, computed: FloatArray, shapes: FloatArray, band: FloatArray) -> list[_Hypothesis]:
+def _tried(measured: FloatArray, computed: FloatArray, shapes: FloatArray, band: FloatArray) -> list[Hypothesis]:
     """All common factors and scatters that are tried, the most likely first."""
     gaps = measured[:, None] - computed
     grid = COMMON_STD * np.linspace(-3, 3, COMMON_STEPS)
@@ -137,7 +127,7 @@ def _tried(measured: FloatArray, computed: FloatArray, shapes: FloatArray, band:
         # of factors as exact as the scatter, more could have been tried than there are steps of the grid
         choice = 2 * np.log(max((grid[1] - grid[0]) / scatter, 1.0))
         total = matching.cost + (offset / COMMON_STD) ** 2 + choice
-        tried.append(_Hypothesis(matching=matching, costs=costs, unmatched=unmatched, total=total))
+        tried.append(Hypothesis(matching=matching, costs=costs, unmatched=unmatched, total=total))
     return sorted(tried, key=lambda hypothesis: hypothesis.total)
 
 
@@ -153,17 +143,6 @@ def _likely_factors(gaps: FloatArray, shapes: FloatArray, scatter: float) -> lis
         if all(abs(offsets[place] - other) > scatter for other in chosen):
             chosen.append(float(offsets[place]))
     return chosen
-
-
-def _over_all(tried: list[_Hypothesis]) -> FloatArray:
-    """Probability of every pair, over all hypotheses."""
-    totals = np.array([hypothesis.total for hypothesis in tried])
-    weights = np.exp(-(totals - totals.min()) / 2)
-    weights /= weights.sum()
-    likely = np.flatnonzero(weights > np.finfo(float).eps)
-    return np.asarray(
-        sum(weights[place] * pair_probabilities(tried[place].costs, *tried[place].unmatched) for place in likely)
-    )
 
 
 def _gains(measured: ComplexArray, computed: ComplexArray, noise: FloatArray, partner: IntArray) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.pairing.frequency_scatter import NARROWER, frequency_cost
-from frf_ipz.pairing.matching import Matching, match, pair_probabilities
+from frf_ipz.pairing.matching import Hypothesis, Matching, match, mixed_probabilities
 from frf_ipz.rational import PoleResidueModel
 
 if TYPE_CHECKING:
@@ -87,17 +87,14 @@ def pair_zeros(
     tried = []
     for scatter in (ZERO_STD, *(ZERO_STD / NARROWER).tolist()):
         costs = np.where(is_allowed, frequency_cost(gap, ZERO_STD, scatter) + wrong, np.inf)
-        tried.append((match(costs, *unmatched), costs))
-    weights = np.exp(-(np.array([matching.cost for matching, _ in tried]) - min(m.cost for m, _ in tried)) / 2)
-    matching, costs = tried[int(np.argmax(weights))]
-    shares = weights / weights.sum()
+        matching = match(costs, *unmatched)
+        tried.append(Hypothesis(matching=matching, costs=costs, unmatched=unmatched, total=matching.cost))
+    best = min(tried, key=lambda hypothesis: hypothesis.total)
     return ZeroPairing(
         measured=measured,
-        matching=matching,
-        probabilities=np.asarray(
-            sum(share * pair_probabilities(each, *unmatched) for share, (_, each) in zip(shares, tried, strict=True))
-        ),
-        costs=costs,
+        matching=best.matching,
+        probabilities=mixed_probabilities(tried),
+        costs=best.costs,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError
@@ -81,6 +81,23 @@ class PipelineInputs:
         """What the FE model was made from."""
         files = [self.digests[name] for name in self.model_names]
         return [*files, self.test.nominal_damping_ratio, sorted(self.test.sensor_masses.items())]
+
+    @property
+    def places_of_mistakes(self) -> PlacesOfMistakes:
+        """Where a mistake of the user's would stand."""
+        return {
+            "test_file": self.test.path.name,
+            "model_file": Path(next(iter(self.model_names), "FE model")).name,
+            "is_recorded": self.test.kind != "frf",
+        }
+
+
+class PlacesOfMistakes(TypedDict):
+    """Files in which a mistake would stand, and whether the test has columns of recordings, or names FRFs."""
+
+    test_file: str
+    model_file: str
+    is_recorded: bool
 
 
 def read_inputs(path: Path) -> PipelineInputs:

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 from scipy.linalg import eigh
 
-from frf_ipz.fe.response import compute_frfs
 from frf_ipz.identification.results.shapes import mode_shapes
 from frf_ipz.modes import modal_assurance
 from frf_ipz.updating.targets import Target, target_rows
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
     from frf_ipz.frf import FrfLabel
     from frf_ipz.runs.results import Results
-    from frf_ipz.structure import ReducedModel
 
 FRFS_SHOWN_AT_FIRST = 6  # the others are a click away
 AT_REST = 1e-9  # of the largest eigenvalue: a rigid-body mode, which no fit has
@@ -116,30 +114,6 @@ def fitted_lines(run: Results) -> IntArray:
     return np.arange(run.frfs.n_lines) if run.fit is None else np.flatnonzero(run.fit.used_lines)
 
 
-def model_values(run: Results, model: ReducedModel, lines: IntArray | None = None) -> ComplexArray:
-    """Compute FRFs of a reduced model at the measured points, on the lines and at the s of the measurement.
-
-    Parameters
-    ----------
-    run : Results
-        The run.
-    model : ReducedModel
-        Nominal or updated.
-    lines : int array, optional
-        Which lines; those that were fitted where it is left out.
-
-    Returns
-    -------
-    (n_lines, n_frfs) complex array
-        In the unit of the measurement; empty without one.
-    """
-    if run.frfs is None:
-        return np.zeros((0, 0), complex)
-    values = compute_frfs(model, run.frfs.labels, run.frfs.s[fitted_lines(run) if lines is None else lines])
-    updated = run.updated_model
-    return values if updated is None else values * updated.scale_of(model).gains(run.frfs.labels)
-
-
 def models_beside_measurement(run: Results) -> ModelsBesideMeasurement | None:
     """Give measured FRFs beside those of the models before and after updating.
 
@@ -156,16 +130,13 @@ def models_beside_measurement(run: Results) -> ModelsBesideMeasurement | None:
     if run.frfs is None or run.updated_model is None:
         return None
     lines = np.flatnonzero(run.frfs.in_band(run.band_hz))
-    measured = np.asarray(run.frfs.values[lines])
-    nominal, updated = (
-        model_values(run, model, lines) for model in (run.updated_model.nominal, run.updated_model.model)
-    )
+    labels, s = run.frfs.labels, run.frfs.s[lines]
     return ModelsBesideMeasurement(
         frequency_hz=run.frfs.frequency_hz[lines],
-        labels=run.frfs.labels,
-        measured=measured,
-        nominal=nominal,
-        updated=updated,
+        labels=labels,
+        measured=np.asarray(run.frfs.values[lines]),
+        nominal=run.updated_model.compute_frfs(labels, s, nominal=True),
+        updated=run.updated_model.compute_frfs(labels, s),
         has_fitted_gains=run.updated_model.scale.is_relative and run.updated_model.scale.is_fitted,
     )
 

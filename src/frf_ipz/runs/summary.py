@@ -105,9 +105,8 @@ def note_lines(notes: Mapping[str, Sequence[str]], *, has_page: bool) -> list[tu
     list of pairs of str
         Title and text of each line.
     """
-    ranked = sorted((place, stage) for stage, texts in notes.items() for place in range(len(texts)))
-    in_order = {stage: number for number, stage in enumerate(notes)}
-    ranked.sort(key=lambda entry: (entry[0], in_order[entry[1]]))
+    ranked = [(place, stage) for stage, texts in notes.items() for place in range(len(texts))]
+    ranked.sort(key=lambda entry: entry[0])  # stages stay in their order
     shown, rest = ranked[:MOST_NOTES], [stage for _, stage in ranked[MOST_NOTES:]]
     lines = [(NOTE, notes[stage][place]) for place, stage in shown]
     if rest:

@@ -10,6 +10,8 @@ import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.display import Drawn, Tabulated
+from frf_ipz.fe.response import compute_frfs
+from frf_ipz.frf import FrfLabel
 from frf_ipz.numerics.rigid_motions import meet_no_force, without_force
 from frf_ipz.structure import ReducedModel
 from frf_ipz.updating.scale import MeasuredScale
@@ -122,20 +124,25 @@ class UpdatedModel(Tabulated, Drawn):
         counts = f"{len(self.after)} targets, {len(self.history)} iterations"
         return f"UpdatedModel: {self.method}, {self.status.value}, {counts}, {len(self.model.dofs)} DOFs"
 
-    def scale_of(self, model: ReducedModel) -> MeasuredScale:
-        """Give the gains over one of the two models.
+    def compute_frfs(self, labels: tuple[FrfLabel, ...], s: ComplexArray, *, nominal: bool = False) -> ComplexArray:
+        """Compute FRFs in the unit of the measurement: those of the model times the gains over it.
 
         Parameters
         ----------
-        model : ReducedModel
-            The updated or the nominal one.
+        labels : tuple of FrfLabel
+            Which FRFs.
+        s : (n_lines,) complex array
+            Where, rad/s.
+        nominal : bool
+            Of the model before updating.
 
         Returns
         -------
-        MeasuredScale
-            Its gains.
+        (n_lines, n_frfs) array
+            Complex.
         """
-        return self.scale if model is self.model else self.nominal_scale
+        model, scale = (self.nominal, self.nominal_scale) if nominal else (self.model, self.scale)
+        return np.asarray(compute_frfs(model, labels, s) * scale.gains(labels))
 
 
 def nothing_to_do(model: ReducedModel, method: str) -> UpdatedModel:

@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import data_sets
 import frf_ipz
+from data_sets import BOTH_ENDS
 from frf_ipz.errors import InputError
 from synthetic_campaign import Structure
 
@@ -20,21 +22,16 @@ GRAVITY, POUND_FORCE, INCH = 9.80665, 4.4482216152605, 0.0254
 def data_set(
     *,
     kind=4,
-    ends="      NONE         5   3       NONE         3   3",
+    ends=BOTH_ENDS,
     ordinate=("12", "Acceleration", "m/s2"),
     denominator=("13", "Excit. force", "N"),
     abscissa=("18", "Frequency", "Hz"),
     values=VALUES,
     start=5.0,
-    number=lambda value: f"{value:20.11e}",
+    number=None,
 ):
-    head = [f"{kind:5d}         0    0         0 {ends}"]
-    head += [f"         6{len(values):10d}         1{start:13.5e}{1.0:13.5e}{0.0:13.5e}"]
-    for data_type, label, unit in (abscissa, ordinate, denominator, ("0", "NONE", "NONE")):
-        head.append(f"{data_type:>10s}    0    0    0 {label:<20s} {unit:<20s}")
-    numbers = [number(part) for value in values for part in (value.real, value.imag)]
-    rows = ["".join(numbers[first : first + 4]) for first in range(0, len(numbers), 4)]
-    return "\n".join(["    -1", "    58", *["NONE"] * 5, *head, *rows, "    -1", ""])
+    axes = abscissa, ordinate, denominator
+    return data_sets.data_set(values, axes=axes, kind=kind, ends=ends, start=start, number=number)
 
 
 def units_164(length, force):

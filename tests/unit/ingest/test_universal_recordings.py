@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+import data_sets
 import frf_ipz
+from data_sets import NONE
 from frf_ipz.errors import InputError
 from synthetic_campaign import Structure, hammer_campaign, impact
 
@@ -11,13 +13,15 @@ RATE_HZ = 2048
 SIGNALS = impact(Structure())
 
 
-def data_set(values, *, node, label, unit="NONE", direction=3, kind=1, start=0.0):
-    head = [f"{kind:5d}         0    0         0       NONE{node:10d}{direction:4d}       NONE         0   0"]
-    head += [f"         4{len(values):10d}         1{start:13.5e}{1.0 / RATE_HZ:13.5e}{0.0:13.5e}"]
-    axes = ((17, "Time", "s"), (0, label, unit), (0, "NONE", "NONE"), (0, "NONE", "NONE"))
-    head += [f"{number:10d}    0    0    0 {name:<20s} {text:<20s}" for number, name, text in axes]
-    rows = ["".join(f"{value:20.11e}" for value in values[first : first + 4]) for first in range(0, len(values), 4)]
-    return "\n".join(["    -1", "    58", *["NONE"] * 5, *head, *rows, "    -1", ""])
+def data_set(values, *, node, label, unit="NONE", kind=1):
+    return data_sets.data_set(
+        values,
+        axes=((17, "Time", "s"), (0, label, unit), NONE),
+        kind=kind,
+        ends=f"      NONE{node:10d}   3       NONE         0   0",
+        ordinate_type=4,
+        step=1.0 / RATE_HZ,
+    )
 
 
 def recording(force_unit="N", unit="g"):

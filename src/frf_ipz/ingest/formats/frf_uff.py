@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.dofs import DIRECTIONS, Dof
+from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf, note_at_rest
 from frf_ipz.ingest.formats.universal_file import (
@@ -15,6 +15,7 @@ from frf_ipz.ingest.formats.universal_file import (
     FRF,
     TIME_RESPONSE,
     describe_functions,
+    find_dof,
     is_universal,
     read_functions,
 )
@@ -144,11 +145,12 @@ def _make_dof(source: FrfSource, function: UniversalFunction, node: int, directi
     if direction == 0 and source.direction:
         sign = -1 if source.direction.startswith("-") else 1
         return Dof(node, source.direction.lstrip("+-"), sign)
-    if not 1 <= abs(direction) <= len(DIRECTIONS):
+    dof = find_dof(node, direction)
+    if dof is None:
         problem = f"states no direction of the {end} (direction {direction} at node {node})"
         way_out = "give its [[frf]] a 'direction' for all FRFs that have none, as in direction = \"z\""
         raise FileFormatError(source.path, f"{problem}; {way_out}, or name {key}", where=where)
-    return Dof(node, DIRECTIONS[abs(direction) - 1], 1 if direction > 0 else -1)
+    return dof
 
 
 def _check_quantity(source: FrfSource, function: UniversalFunction, name: str) -> None:

@@ -6,10 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.dofs import DIRECTIONS, Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats.recording import RawRecording
-from frf_ipz.ingest.formats.universal_file import TIME_RESPONSE, describe_functions, is_universal, read_functions
+from frf_ipz.ingest.formats.universal_file import (
+    TIME_RESPONSE,
+    describe_functions,
+    find_dof,
+    is_universal,
+    read_functions,
+)
 from frf_ipz.ingest.units import is_stated
 from frf_ipz.input_files import read_bytes
 
@@ -79,9 +84,7 @@ def _find(path: Path, responses: Sequence[UniversalFunction], column: str) -> Un
 
 def _dof(function: UniversalFunction) -> str:
     node, direction, *_ = function.ends
-    if node < 1 or not 1 <= abs(direction) <= len(DIRECTIONS):
-        return str(node)
-    return str(Dof(node, DIRECTIONS[abs(direction) - 1], 1 if direction > 0 else -1))
+    return str(find_dof(node, direction) or node)
 
 
 def _label(function: UniversalFunction) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.dofs import DIRECTIONS, Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.text_numbers import NumberError, parse_numbers
 
@@ -120,6 +121,26 @@ def is_universal(head: bytes) -> bool:
     lines = head.lstrip(b"\r\n \t").replace(b"\r", b"\n").split(b"\n", 3)
     lines = [line.strip() for line in lines if line.strip()]
     return len(lines) > 1 and lines[0] == b"-1" and lines[1][:1].isdigit()
+
+
+def find_dof(node: int, direction: int) -> Dof | None:
+    """Make the DOF of an end of a function.
+
+    Parameters
+    ----------
+    node : int
+        Its node; 0 is the ground.
+    direction : int
+        1 to 6 for x to rz, with a sign; 0 for none.
+
+    Returns
+    -------
+    Dof or None
+        None where the file names no node, or no direction.
+    """
+    if node < 1 or not 1 <= abs(direction) <= len(DIRECTIONS):
+        return None
+    return Dof(node, DIRECTIONS[abs(direction) - 1], 1 if direction > 0 else -1)
 
 
 def read_functions(path: Path, data: bytes) -> tuple[UniversalFunction, ...]:

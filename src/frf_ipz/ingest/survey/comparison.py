@@ -135,9 +135,11 @@ def _compare_output(
 ) -> OutputComparison | None:
     """Compare one response of all impacts; of few, one with lost samples is told only by trying just that."""
     comparison = compare_output(spectra, output)
+    if comparison is None:
+        return None
     n_tried = int(spectra.valid.sum())
-    for impact in comparison.agreeing if comparison is not None else ():
-        if comparison is None or len(comparison.agreeing) <= FEWEST:
+    for impact in comparison.agreeing:
+        if len(comparison.agreeing) <= FEWEST:
             break
         without = leave_out(spectra, output, comparison, impact)
         response, noise = spectra.responses[impact, output], spectra.noise[impact, output]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,9 +41,9 @@ def compare_with_model(inputs: PipelineInputs, estimate: FrfEstimate) -> Look:
     Look
         The peaks and the model's frequencies in the same band; what most likely has to be corrected.
     """
-    files, labels = _Files.of(inputs), estimate.frfs.labels
+    places, labels = inputs.places_of_mistakes, estimate.frfs.labels
     impacts = estimate.traces if inputs.test.kind == "hammer" else ()
-    exchanged = find_exchanged_columns(impacts, labels, test_file=files.test)
+    exchanged = find_exchanged_columns(impacts, labels, test_file=places["test_file"])
     try:
         peaks = find_peaks(estimate.frfs, inputs.options.fit)
     except FrfIpzError as error:
@@ -56,13 +54,7 @@ def compare_with_model(inputs: PipelineInputs, estimate: FrfEstimate) -> Look:
     if exchanged is not None or inputs.fe_model is None:
         return Look(lines=(line,), open_points=tuple(_worded(exchanged)))
     measured = modes_of_peaks(peaks, labels)
-    situation = compare_modes(
-        measured,
-        inputs.fe_model,
-        test_file=files.test,
-        model_file=files.model,
-        is_recorded=inputs.test.kind != "frf",
-    )
+    situation = compare_modes(measured, inputs.fe_model, **places)
     if situation is None:
         return Look(lines=(line,))
     beside = f"    model   {_listed(_in_band(situation))}"
@@ -78,18 +70,6 @@ def _open_points(situation: Situation, *, is_relative: bool) -> list[str]:
     if cause is not None:
         return _worded(cause)
     return [] if agrees(situation) else _disagreement(situation)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Files:
-    """Names of the files that a mistake may stand in."""
-
-    test: str
-    model: str
-
-    @staticmethod
-    def of(inputs: PipelineInputs) -> _Files:
-        return _Files(test=inputs.test.path.name, model=Path(next(iter(inputs.model_names), "FE model")).name)
 
 
 def _worded(cause: LikelyCause | None) -> list[str]:

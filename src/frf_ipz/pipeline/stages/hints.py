@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.assessment.assess import likely_cause
 from frf_ipz.errors import InputError, NumericalError
-from frf_ipz.pipeline.stages.outputs import places_of_mistakes
 
 if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
@@ -53,8 +52,7 @@ def naming_the_cause(
             fit,
             fe_model,
             impacts=impacts,
-            is_recorded=inputs.test.kind != "frf",
-            **places_of_mistakes(inputs),
+            **inputs.places_of_mistakes,
         )
         if cause is None:
             raise

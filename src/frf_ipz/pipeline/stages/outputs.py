@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import Trace
     from frf_ipz.pairing.pairs import Pairs
-    from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.pipeline.stage_runner import StageRunner
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.runs.folder import Writers
@@ -73,22 +71,6 @@ def predict(runner: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, frf
         lambda _: predict_frfs(modal_fit, updated, points=inputs.points, frequency_hz=lines),
         lambda result: {"poi_frf.parquet": partial(write_table, tables.prediction_table(result))},
     )
-
-
-def places_of_mistakes(inputs: PipelineInputs) -> dict[str, str]:
-    """Name the files in which a mistake would stand, for an assessment.
-
-    Parameters
-    ----------
-    inputs : PipelineInputs
-        What is worked on.
-
-    Returns
-    -------
-    dict of str to str
-        ``test_file`` and ``model_file``.
-    """
-    return {"test_file": inputs.test.path.name, "model_file": Path(next(iter(inputs.model_names), "FE model")).name}
 
 
 def assess(
@@ -135,12 +117,12 @@ def assess(
         The verdict with its checks.
     """
     inputs = runner.inputs
-    named = places_of_mistakes(inputs)
+    places = inputs.places_of_mistakes
     optional = {"diagnose": diagnosis, "reference": inputs.reference, "causes": with_causes}
     rests_on = ("predict", *(name for name, result in optional.items() if result is not None))
     assessment = runner.stage(
         "assess",
-        {"after": runner.after(*rests_on), **named},
+        {"after": runner.after(*rests_on), **places},
         lambda _: judge_run(
             Evidence(
                 frfs=frfs,
@@ -154,8 +136,7 @@ def assess(
                 with_causes=with_causes,
                 is_corrected=inputs.options.diagnose.apply,
                 impacts=traces if inputs.test.kind == "hammer" else (),
-                is_recorded=inputs.test.kind != "frf",
-                **named,
+                **places,
             )
         ),
     )
