@@ -68,6 +68,12 @@ class Command:
         while self.counter.value < n_changes and self.is_at_work and time.monotonic() < end:
             self.pause()
 
+    def wait_for_words(self):
+        """Wait until it has said something, or has come to its end."""
+        end = time.monotonic() + LONGEST_S
+        while not self.said and self.is_at_work and time.monotonic() < end:
+            self.pause()
+
     @property
     def is_at_work(self):
         """Whether it has not come to its end."""
@@ -100,6 +106,7 @@ def _context():
 
 def _work(arguments, log, counter, options):
     sys.dont_write_bytecode = True
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background inherits that it is ignored
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     for stream in (1, 2):
         os.dup2(descriptor, stream)
