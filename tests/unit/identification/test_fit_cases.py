@@ -266,19 +266,33 @@ def test_the_deviation_of_a_common_delay_is_true():
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.5  # 12 numbers: three standard deviations
 
 
-def test_complex_modes_are_no_delay():
+def fit_of_complex_modes(turned_by, *, sizes=1.0):
+    """Fit modes whose residues in three FRFs are turned by angles, (n_modes, 3); give the truth too."""
     rng = np.random.default_rng(SEED)
     truth = random_modes(SPREAD, 0.005, n_outputs=3, n_inputs=1, seed=SEED)
-    phases = np.exp(0.2j * rng.standard_normal((len(SPREAD), 3)))
+    phases = sizes * np.exp(1j * turned_by(rng))
     s = 2j * np.pi * LINES_HZ
     residues = truth.residues() * phases
     values = (1 / (s[:, None] - truth.poles)) @ residues + (1 / (s[:, None] - truth.poles.conj())) @ residues.conj()
     values *= s[:, None] ** 2
     std = 1e-3 * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
-    fit = fit_modes(with_noise(LINES_HZ, values, labels_of(3, 1), std, rng), options=FitOptions())
+    return fit_modes(with_noise(LINES_HZ, values, labels_of(3, 1), std, rng), options=FitOptions()), truth
+
+
+def test_complex_modes_are_no_delay():
+    fit, truth = fit_of_complex_modes(lambda rng: 0.2 * rng.standard_normal((len(SPREAD), 3)))
     assert_complete(fit, truth)
     assert not fit.model.delay_s.any()
     assert fit.warnings == ()
+
+
+def test_one_complex_mode_is_no_delay_however_much_of_the_misfit_it_makes():
+    strongest = np.arange(len(SPREAD)) == 4
+    fit, truth = fit_of_complex_modes(
+        lambda _: 0.3 * strongest[:, None] * np.ones(3), sizes=np.where(strongest, 100.0, 1.0)[:, None]
+    )
+    assert_complete(fit, truth)
+    assert not fit.model.delay_s.any()
 
 
 def test_pinned_and_rejected_poles():
