@@ -40,6 +40,7 @@ class Command:
 
     def __init__(self, *arguments, log, work=None, within=None, most_bytes=None, **faults):
         self.log, self.counter = Path(log), _context().Value("i", 0)
+        self.log.unlink(missing_ok=True)  # what an earlier command has said there is not what this one says
         options = {
             "faults": {"within": None if within is None else os.fspath(Path(within).resolve()), **faults},
             "most_bytes": most_bytes,
@@ -68,10 +69,10 @@ class Command:
         while self.counter.value < n_changes and self.is_at_work and time.monotonic() < end:
             self.pause()
 
-    def wait_for_words(self):
-        """Wait until it has said something, or has come to its end."""
+    def wait_for_begin(self, *, words=False):
+        """Wait until it has begun, or has said something, or has come to its end."""
         end = time.monotonic() + LONGEST_S
-        while not self.said and self.is_at_work and time.monotonic() < end:
+        while not (self.said if words else self.log.exists()) and self.is_at_work and time.monotonic() < end:
             self.pause()
 
     @property
