@@ -25,13 +25,15 @@ MOST_MEMORY = 1 << 28  # bytes of values from one text: half of what looking at 
 BYTES_OF_LETTER, BYTES_OF_QUOTATION_MARK, BYTES_OF_CONTAINER, BYTES_OF_ITEM = 9, 90, 240, 40
 
 
-def read_json(path: Path) -> dict[str, Any]:
+def read_json(path: Path, *, most_memory: int = MOST_MEMORY) -> dict[str, Any]:
     """Read a JSON file that holds one object.
 
     Parameters
     ----------
     path : Path
         The file.
+    most_memory : int, optional
+        Bytes that its values may take.
 
     Returns
     -------
@@ -43,10 +45,10 @@ def read_json(path: Path) -> dict[str, Any]:
     FileFormatError
         If it is missing, no file, no JSON object, nested too deeply or too large.
     """
-    return parse_json(read_bytes(path, most_bytes=MOST_MEMORY // BYTES_OF_LETTER), path)
+    return parse_json(read_bytes(path, most_bytes=most_memory // BYTES_OF_LETTER), path, most_memory=most_memory)
 
 
-def parse_json(data: bytes, path: Path) -> dict[str, Any]:
+def parse_json(data: bytes, path: Path, *, most_memory: int = MOST_MEMORY) -> dict[str, Any]:
     """Parse a JSON text that holds one object.
 
     Parameters
@@ -55,6 +57,8 @@ def parse_json(data: bytes, path: Path) -> dict[str, Any]:
         The text, UTF-8.
     path : Path
         The file that it comes from, for the message.
+    most_memory : int, optional
+        Bytes that its values may take.
 
     Returns
     -------
@@ -66,8 +70,8 @@ def parse_json(data: bytes, path: Path) -> dict[str, Any]:
     FileFormatError
         If it is no JSON object, nested too deeply, or its values take too much memory.
     """
-    if memory_of_values(data) > MOST_MEMORY:
-        raise FileFormatError(path, f"holds more values than {MOST_MEMORY >> 20} MB of memory take; is it damaged?")
+    if memory_of_values(data) > most_memory:
+        raise FileFormatError(path, f"holds more values than {most_memory >> 20} MB of memory take; is it damaged?")
     try:
         values = json.loads(data.decode("utf-8"))
         if HALF_A_LETTER.search(data):

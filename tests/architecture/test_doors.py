@@ -11,6 +11,7 @@ OPENS = {
     "fdopen",
     "UFF",
     "mmread",
+    "loadmat",
     "loadtxt",
     "genfromtxt",
     "read_csv",
@@ -20,12 +21,12 @@ PARSES = {"json.load", "json.loads", "tomllib.load", "tomllib.loads", "pickle.lo
 ALLOWED = {
     "input_files.py": {"path.open"},  # the door itself
     "json_files.py": {"json.loads"},
+    "matlab_files.py": {"loadmat"},  # of bytes that are expanded up to a limit
     "toml_files.py": {"tomllib.loads"},
     "output_files.py": {"path.open", "os.open"},  # syncs what has just been written
     "report/html.py": {"read_text"},  # the package's own scripts and style sheets
     "cli/local_page.py": {"webbrowser.open"},
     "ingest/formats/registry.py": {"candidate.open"},  # a format's own method
-    "export/state_space_files.py": {"json.loads"},  # of any size, as the user's own export may be
     "show/app.py": {"json.loads"},  # a request
     "fe/matrices/matrix_market.py": {"io.mmread"},  # of bytes that are checked
     "ingest/formats/frf_uff.py": {"pyuff.UFF"},  # takes a path; the registry has read its head by the door

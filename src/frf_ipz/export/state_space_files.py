@@ -9,19 +9,18 @@ from __future__ import annotations
 import json
 from contextlib import contextmanager
 from dataclasses import asdict
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.io import loadmat, savemat
-from scipy.io.matlab import MatReadError
+from scipy.io import savemat
 
 from frf_ipz.arguments import require_file
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.export.state_space import ARRAYS, NAMES, StateSpaceModel, from_control, matrix_shapes, to_control
 from frf_ipz.export.uncertainty import UncertaintyWeights
-from frf_ipz.input_files import read_bytes
+from frf_ipz.json_files import read_json
+from frf_ipz.matlab_files import read_matlab
 from frf_ipz.output_files import replacing, write_text
 
 if TYPE_CHECKING:
@@ -44,7 +43,7 @@ ENSEMBLE = {  # what is different in the file of an ensemble
     "C": "(n_outputs, n_states, n_members)",
     "D": "(n_outputs, n_inputs, n_members)",
 }
-UNREADABLE = (MatReadError, NotImplementedError, OSError)  # no MATLAB file, or one of version 7.3
+MOST_MEMORY = 1 << 32  # bytes of a state space as text: some 3000 states
 
 
 def write_state_space(system: StateSpaceModel | control.StateSpace, path: str | Path) -> None:
@@ -120,13 +119,13 @@ def read_state_space_arrays(path: str | Path) -> StateSpaceModel:
         If the file is no such state space.
     """
     path = require_file(path)
+    values = read_json(path, most_memory=MOST_MEMORY) if _suffix(path) == ".json" else read_matlab(path)
     try:
-        values = json.loads(read_bytes(path)) if _suffix(path) == ".json" else _read_matlab(path)
         names = _names_in(values)
         arrays = {name: np.array(values[name], float).reshape(shape) for name, shape in matrix_shapes(names).items()}
         dt = float(np.squeeze(values["dt"]))
         notes = tuple(str(_text_in(text)) for text in np.ravel(values.get("notes", ())))
-    except (*UNREADABLE, KeyError, TypeError, ValueError, RecursionError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(
             path, f"is no state space written by frf_ipz ({type(error).__name__}: {error}); export it again"
         ) from error
@@ -251,8 +250,8 @@ def read_ensemble_arrays(path: str | Path) -> tuple[StateSpaceModel, ...]:
         If the file is no such ensemble.
     """
     path = require_file(path)
+    values = read_matlab(path)
     try:
-        values = _read_matlab(path)
         fields: dict[str, Any] = {**_names_in(values)}
         arrays = {
             name: np.moveaxis(np.array(values[name], float).reshape(*shape, -1), -1, 0)
@@ -263,7 +262,7 @@ def read_ensemble_arrays(path: str | Path) -> tuple[StateSpaceModel, ...]:
             StateSpaceModel(**fields, **dict(zip(ARRAYS, member, strict=True)))
             for member in zip(*(arrays[name] for name in ARRAYS), strict=True)
         )
-    except (*UNREADABLE, KeyError, TypeError, ValueError, RecursionError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(
             path, f"is no ensemble written by frf_ipz ({type(error).__name__}: {error}); export it again"
         ) from error
@@ -371,22 +370,16 @@ def read_uncertainty_weights(path: str | Path) -> UncertaintyWeights:
     ('6:+z', '11:+z', '9:+z')
     """
     path = require_file(path)
+    values = read_json(path)
     try:
-        values = json.loads(read_bytes(path))
         names = tuple(str(name) for name in values.pop("output_names"))
         return UncertaintyWeights(
             output_names=names, **{name: np.array(value, float) for name, value in values.items()}
         )
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(
             path, f"holds no uncertainty weights written by frf_ipz ({type(error).__name__}: {error}); export it again"
         ) from error
-
-
-def _read_matlab(path: Path) -> dict[str, Any]:
-    stream: Any = BytesIO(read_bytes(path))
-    content: dict[str, Any] = loadmat(stream)
-    return content
 
 
 def _names_for_matlab(model: StateSpaceModel) -> dict[str, np.ndarray]:

@@ -1,0 +1,110 @@
+"""MATLAB files: what SciPy writes is read, what a hostile hand writes is refused before memory is taken."""
+
+import struct
+import zlib
+
+import numpy as np
+import pytest
+import scipy.sparse
+from scipy.io import savemat
+
+from frf_ipz.errors import FileFormatError
+from frf_ipz.matlab_files import read_matlab
+
+VALUES = {"A": np.arange(6.0).reshape(2, 3), "names": np.array(["a", "bc"], dtype=object), "z": np.array([[1 + 2j]])}
+
+
+def header(order="<"):
+    return b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack(f"{order}HH", 0x0100, 0x4D49)
+
+
+def compressed(content):
+    packed = zlib.compress(content, 9)
+    return struct.pack("<II", 15, len(packed)) + packed
+
+
+@pytest.mark.parametrize("options", [{"format": "4"}, {}, {"do_compression": True}])
+def test_every_version_below_seven_point_three_is_read(tmp_path, options):
+    values = {"A": VALUES["A"]} if options.get("format") == "4" else VALUES
+    savemat(tmp_path / "a.mat", values, **options)
+    back = read_matlab(tmp_path / "a.mat")
+    for name in values.keys() - {"names"}:
+        np.testing.assert_array_equal(back[name], values[name])
+    if "names" in values:
+        assert [str(text[0]) for text in back["names"].ravel()] == ["a", "bc"]
+
+
+def test_a_small_file_of_many_zeros_is_refused(tmp_path):
+    path = tmp_path / "bomb.mat"
+    path.write_bytes(header() + compressed(bytes(3_000_000)))
+    with pytest.raises(FileFormatError, match=r"bomb\.mat.*more than 1 MB, expanded"):
+        read_matlab(path, most_bytes=1 << 20)
+
+
+def test_small_parts_add_up(tmp_path):
+    path = tmp_path / "bomb.mat"
+    path.write_bytes(header() + compressed(bytes(600_000)) * 2)
+    with pytest.raises(FileFormatError, match="expanded"):
+        read_matlab(path, most_bytes=1 << 20)
+
+
+def cells_that_are_said_to_be(number):
+    flags = struct.pack("<IIII", 6, 8, 1, 0)
+    dimensions = struct.pack("<IIii", 5, 8, number, 1)
+    content = flags + dimensions + struct.pack("<II", 1, 1) + b"c".ljust(8)
+    return struct.pack("<II", 14, len(content)) + content
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        cells_that_are_said_to_be(2_000_000_000),
+        cells_that_are_said_to_be(-5),
+        struct.pack("<II", 14, 0xFFFFFFF0),
+        struct.pack("<II", 15, 8) + b"no zlib!",
+        struct.pack("<II", 14, 16) + b"\xff" * 16,
+        compressed(cells_that_are_said_to_be(3)[:20]),
+    ],
+    ids=["many cells", "fewer than none", "long", "no zlib", "no matrix", "cut"],
+)
+def test_what_is_damaged_is_one_clear_error(tmp_path, body):
+    path = tmp_path / "damaged.mat"
+    path.write_bytes(header() + body)
+    with pytest.raises(FileFormatError, match=r"damaged\.mat"):
+        read_matlab(path)
+
+
+RICH = {
+    **VALUES,
+    "sparse": scipy.sparse.random(6, 5, 0.4, random_state=1).tocsc(),
+    "record": {"name": "a", "values": np.arange(4, dtype=np.int16), "inner": {"deep": np.eye(2)}},
+    "cells": np.array([np.eye(2), "text", np.array([], dtype=object)], dtype=object),
+    "text": "some text",
+}
+
+
+def test_all_that_can_be_written_is_read(tmp_path):
+    savemat(tmp_path / "a.mat", RICH, do_compression=True)
+    back = read_matlab(tmp_path / "a.mat")
+    np.testing.assert_array_equal(back["sparse"].toarray(), RICH["sparse"].toarray())
+    assert back["text"][0] == "some text"
+    np.testing.assert_array_equal(back["record"]["inner"][0, 0]["deep"][0, 0], np.eye(2))
+    assert back["cells"].ravel()[1][0] == "text"
+
+
+def test_a_changed_byte_gives_values_or_the_error_of_the_project(tmp_path):
+    path = tmp_path / "a.mat"
+    savemat(path, RICH, do_compression=False)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(3)
+    refused = 0
+    for _ in range(600):
+        damaged = bytearray(whole)
+        for place in rng.integers(124, len(whole), rng.integers(1, 4)):
+            damaged[place] = rng.choice([0, 1, 255, rng.integers(256)])
+        path.write_bytes(damaged)
+        try:
+            read_matlab(path)
+        except FileFormatError:
+            refused += 1
+    assert 0 < refused < 600
