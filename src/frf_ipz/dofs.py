@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 
 from frf_ipz.errors import InputError
 
-DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+TRANSLATIONS = ("x", "y", "z")
+DIRECTIONS = (*TRANSLATIONS, "rx", "ry", "rz")
+GENERALISED = "q"  # the amplitude of a mode or of a super-element's motion, which has no direction
 _LABEL = re.compile(r"^\s*([0-9]{1,18})\s*:\s*([+-]?)\s*(r?[xyz])\s*$")
 _DIRECTION = re.compile(r"[+-]?r?[xyz]")
 
@@ -22,7 +24,7 @@ class Dof:
     node : int
         Node number; 0 is the ground.
     direction : str
-        One of x, y, z, rx, ry, rz.
+        One of x, y, z, rx, ry, rz; or q, a generalised DOF inside a model, which no label of a test names.
     sign : int
         +1 or -1.
 

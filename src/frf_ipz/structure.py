@@ -6,7 +6,9 @@ missing to the full one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -16,15 +18,16 @@ from scipy import sparse
 from frf_ipz.arguments import require_choice, take_array
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray, Matrix, require_finite, require_shape
 from frf_ipz.display import Concise, Drawn
-from frf_ipz.dofs import Dof, as_dofs
+from frf_ipz.dofs import GENERALISED, Dof, as_dofs
 from frf_ipz.errors import InputError, ShapeError
-from frf_ipz.numerics.definiteness import require_positive_definite_mass, require_semidefinite, symmetrise
-from frf_ipz.numerics.held_rows import find_held_rows
+from frf_ipz.numerics.constraints import AdmissibleMotions
+from frf_ipz.numerics.definiteness import massless_rows
 from frf_ipz.numerics.neighbours import lines_between_neighbours
-from frf_ipz.numerics.rounding import printed_rounding
+from frf_ipz.numerics.structural_matrices import MatrixOptions, ModelMatrices
+from frf_ipz.unit_systems import SI, UnitSystem
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -33,6 +36,7 @@ SPACING_M = 1.0  # between nodes in a row, where nobody knows their positions
 
 DOFS_SHOWN = 6
 HELD = ("auto", "keep")
+GENERALISED_LABEL = re.compile(r"\s*([0-9]{1,18})\s*:\s*[q0]\s*")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -136,6 +140,13 @@ class StructuralModel(Drawn):
         Its elements, springs, groups and point masses.
     held_dofs : tuple of Dof
         DOFs that have no row, because what made the matrices holds them.
+    structural_damping_all : (n_all, n_all) sparse array, optional
+        Imaginary part of a complex stiffness, N/m. A mode takes from it the damping ratio ``phi^T K'' phi / (2
+        omega^2)``, which is right at its resonance; it couples no modes.
+    motions : AdmissibleMotions, optional
+        Where constraint equations join DOFs: the motions that satisfy them.
+    allows_negative_stiffness : bool
+        Negative eigenvalues of the stiffness are meant: magnets, buckling. The poles of such a mode are real.
     notes : tuple of str
         What was recognised in the matrices, and how they were taken.
     rounding : float
@@ -173,6 +184,9 @@ class StructuralModel(Drawn):
     modal_damping: FloatArray
     geometry: Geometry
     parts: tuple[Part, ...] = ()
+    structural_damping_all: Matrix | None = None
+    motions: AdmissibleMotions | None = None
+    allows_negative_stiffness: bool = False
     held_dofs: tuple[Dof, ...] = ()
     notes: tuple[str, ...] = ()
     rounding: float = EPS
@@ -206,17 +220,20 @@ class StructuralModel(Drawn):
         modal_damping: float | Sequence[float] = (),
         name: str = "model",
         held: str = "auto",
+        units: str | Mapping[str, str] = SI,
+        allow_negative_stiffness: bool = False,
     ) -> StructuralModel:
         """Make a model from matrices, and check it.
 
         Parameters
         ----------
         mass, stiffness : (n, n) array, dense or sparse
-            kg and N/m (and their rotational counterparts), symmetric.
+            kg and N/m (and their rotational counterparts), symmetric. A complex stiffness is one with structural
+            damping. DOFs may lack mass, and rows may be those of Lagrange multipliers.
         damping : (n, n) array, dense or sparse, optional
             Viscous damping, N s/m.
         dofs : sequence of Dof or str
-            One a row, such as ``"1:x"``.
+            One a row, such as ``"1:x"``; ``"9:q"`` for the amplitude of a mode or of a super-element's motion.
         coordinates : mapping of int to (3,) sequence, or (n_nodes, 3) array, optional
             Positions of the nodes, m: by node number, or in the order in which `dofs` names the nodes first. Without
             them the nodes are drawn in a row.
@@ -227,11 +244,16 @@ class StructuralModel(Drawn):
         held : str
             ``auto``: rows that are zero, rows of the identity, and rows with a penalty such as 1e36 on the diagonal are
             held DOFs, which are left out; ``keep``: all rows are taken as they are.
+        units : str or mapping of str to str
+            What matrices and coordinates are in: ``SI``, ``mm-t-s``, ``mm-kg-ms``, ``in-lbf-s``, or the units of
+            ``length``, ``mass`` and ``time``.
+        allow_negative_stiffness : bool
+            Whether the stiffness may have negative eigenvalues.
 
         Returns
         -------
         StructuralModel
-            The model; its `notes` say what was left out.
+            The model, in SI; its `notes` say what was left out.
 
         Raises
         ------
@@ -249,39 +271,69 @@ class StructuralModel(Drawn):
         ['1:x', '2:x']
         """
         require_choice("held", held, HELD)
-        rows = tuple(dof.unsigned for dof in as_dofs(dofs, name="dofs"))
+        rows = _rows(dofs)
         whole = {"mass": _square_matrix("mass", mass, len(rows))}
         whole["stiffness"] = _square_matrix("stiffness", stiffness, len(rows))
         if damping is not None:
             whole["damping"] = _square_matrix("damping", damping, len(rows))
-        free = select_free_rows(whole["mass"], whole["stiffness"], rows, held=held)
-        matrices = {what: _symmetric_block(what, matrix, free.rows) for what, matrix in whole.items()}
-        require_positive_definite_mass(matrices["mass"], free.dofs)
-        rounding = printed_rounding(matrices["stiffness"].data)
-        require_semidefinite(matrices["stiffness"], free.dofs, "stiffness", rounding=rounding)
-        none = sparse.csr_array(matrices["mass"].shape, dtype=np.float64)
-        matrices.setdefault("damping", none)
-        require_semidefinite(matrices["damping"], free.dofs, "damping")
+        system = UnitSystem.of(units)
+        options = MatrixOptions(held=held, units=system, allow_negative_stiffness=allow_negative_stiffness)
+        matrices = ModelMatrices.of(whole, rows, options, errors=_errors_of_matrix)
         nodes, positions = _positions(rows, coordinates)
+        return cls.from_model_matrices(
+            matrices,
+            name=name,
+            geometry=drawn_geometry(matrices, nodes, system.length_m * positions, is_schematic=coordinates is None),
+            modal_damping=_damping_ratios(modal_damping),
+            allow_negative_stiffness=allow_negative_stiffness,
+        )
+
+    @classmethod
+    def from_model_matrices(
+        cls,
+        matrices: ModelMatrices,
+        *,
+        name: str,
+        geometry: Geometry,
+        modal_damping: FloatArray,
+        allow_negative_stiffness: bool,
+    ) -> StructuralModel:
+        """Make a model from matrices that have been checked.
+
+        Parameters
+        ----------
+        matrices : ModelMatrices
+            In SI.
+        name : str
+            What it is called.
+        geometry : Geometry
+            Where the nodes are.
+        modal_damping : (n,) array
+            Damping ratios of the elastic modes.
+        allow_negative_stiffness : bool
+            Whether the stiffness may have negative eigenvalues.
+
+        Returns
+        -------
+        StructuralModel
+            The model, without parts.
+        """
         return cls(
             name=name,
             kind="matrices",
-            all_dofs=free.dofs,
-            fixed=np.zeros(len(free.dofs), bool),
-            mass_all=matrices["mass"],
-            stiffness_all=matrices["stiffness"],
-            damping_all=matrices["damping"],
-            modal_damping=_damping_ratios(modal_damping),
-            geometry=Geometry(
-                nodes=nodes,
-                coordinates_m=positions,
-                lines=lines_between_neighbours(whole["stiffness"], rows, nodes, positions),
-                supports=free.supports,
-                is_schematic=coordinates is None,
-            ),
-            held_dofs=free.held_dofs,
-            notes=free.notes,
-            rounding=rounding,
+            all_dofs=matrices.dofs,
+            fixed=np.zeros(len(matrices.dofs), bool),
+            mass_all=matrices.mass,
+            stiffness_all=matrices.stiffness,
+            damping_all=matrices.damping,
+            structural_damping_all=matrices.structural_damping if matrices.structural_damping.nnz else None,
+            motions=matrices.motions,
+            allows_negative_stiffness=allow_negative_stiffness,
+            modal_damping=modal_damping,
+            geometry=geometry,
+            held_dofs=matrices.held_dofs,
+            notes=matrices.notes,
+            rounding=matrices.rounding,
         )
 
     @property
@@ -303,6 +355,25 @@ class StructuralModel(Drawn):
     def damping(self) -> Matrix:
         """(n, n) viscous damping matrix of the free DOFs, without the modal damping."""
         return self._free_block(self.damping_all)
+
+    @property
+    def structural_damping(self) -> Matrix | None:
+        """(n, n) imaginary part of the stiffness of the free DOFs; None where it is real."""
+        return None if self.structural_damping_all is None else self._free_block(self.structural_damping_all)
+
+    @property
+    def free_motions(self) -> AdmissibleMotions | None:
+        """Motions of the free DOFs that satisfy the constraint equations; None where there is no equation."""
+        if self.motions is None or not self.fixed.any():
+            return self.motions
+        return self.motions.rows(np.flatnonzero(~self.fixed))
+
+    @property
+    def n_modes(self) -> int:
+        """Number of modes: that of the free DOFs that have mass and follow from no others."""
+        motions = self.free_motions
+        mass = self.mass if motions is None else motions.reduced(self.mass)
+        return int(np.count_nonzero(~massless_rows(mass)))
 
     def full_index(self, dof: Dof) -> int:
         """Row of a DOF among all, the held ones included.
@@ -376,81 +447,6 @@ class StructuralModel(Drawn):
             f"the model '{self.name}' has no node {dof.node}; its nodes go from {nodes.min()} to {nodes.max()}: "
             "correct the test or the pipeline"
         )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FreeRows:
-    """Rows of matrices that are not those of held DOFs.
-
-    Parameters
-    ----------
-    rows : (n_free,) int array
-        Their numbers, from 0.
-    dofs, held_dofs : tuple of Dof
-        DOFs of these rows, and of the others.
-    notes : tuple of str
-        What was recognised.
-    """
-
-    rows: IntArray
-    dofs: tuple[Dof, ...]
-    held_dofs: tuple[Dof, ...]
-    notes: tuple[str, ...]
-
-    @property
-    def supports(self) -> dict[int, str]:
-        """Nodes with held DOFs, and how they are held."""
-        moving = {dof.node for dof in self.dofs}
-        return {dof.node: "pinned" if dof.node in moving else "clamped" for dof in self.held_dofs}
-
-
-def select_free_rows(mass: Matrix, stiffness: Matrix, dofs: Sequence[Dof], *, held: str) -> FreeRows:
-    """Tell the rows of free DOFs from those that are left in matrices for held ones.
-
-    Parameters
-    ----------
-    mass, stiffness : (n, n) sparse array
-        Of all rows; they need not be symmetric.
-    dofs : sequence of Dof
-        The DOF of each row.
-    held : str
-        ``auto``, or ``keep`` to take all rows as they are.
-
-    Returns
-    -------
-    FreeRows
-        The rows, and notes on what is left out.
-
-    Raises
-    ------
-    InputError
-        If a value is not finite.
-    """
-    for matrix in (mass, stiffness):
-        require_finite("the matrices", matrix.data)
-    marks = find_held_rows(mass, stiffness)
-    if held == "keep" or not marks.any.any():
-        return FreeRows(rows=np.arange(len(dofs)), dofs=tuple(dofs), held_dofs=(), notes=())
-    notes = []
-    for ways, rows in (
-        ("zero in mass and stiffness", marks.zero),
-        ("those of the identity", marks.identity),
-        ("marked by a penalty on the diagonal", marks.penalty),
-    ):
-        names = [dofs[row].name for row in np.flatnonzero(rows).tolist()]
-        if names:
-            shown = ", ".join(names[:DOFS_SHOWN]) + (", ..." if len(names) > DOFS_SHOWN else "")
-            notes.append(
-                f"{len(names)} rows are {ways} ({shown}): these DOFs are held, and left out; [matrices] held = 'keep' "
-                "takes the rows as they are"
-            )
-    free = np.flatnonzero(~marks.any)
-    return FreeRows(
-        rows=free,
-        dofs=tuple(dofs[row] for row in free.tolist()),
-        held_dofs=tuple(dofs[row] for row in np.flatnonzero(marks.any).tolist()),
-        notes=tuple(notes),
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -554,21 +550,76 @@ class ReducedModel:
         return np.asarray(dof.sign * self.expansion[row])
 
 
+def drawn_geometry(
+    matrices: ModelMatrices, nodes: IntArray, positions_m: FloatArray, *, is_schematic: bool = False
+) -> Geometry:
+    """Find how to draw a model of which only matrices are known.
+
+    Parameters
+    ----------
+    matrices : ModelMatrices
+        Its matrices.
+    nodes : (n_nodes,) int array
+        Node numbers, ascending.
+    positions_m : (n_nodes, 3) array
+        Their positions.
+    is_schematic : bool
+        Positions are those of nodes in a row.
+
+    Returns
+    -------
+    Geometry
+        Nodes that only multipliers have are left out, and those of generalised DOFs stand in the middle.
+    """
+    structural = {dof.node for dof in (*matrices.dofs, *matrices.held_dofs) if dof.direction != GENERALISED}
+    generalised = {dof.node for dof in matrices.dofs if dof.direction == GENERALISED} - structural
+    is_structural = np.isin(nodes, list(structural))
+    kept = is_structural | np.isin(nodes, list(generalised))
+    if generalised and is_structural.any():
+        positions_m = np.where(is_structural[:, None], positions_m, positions_m[is_structural].mean(axis=0))
+    drawn = np.array([row for row, dof in enumerate(matrices.dofs) if dof.direction != GENERALISED], np.int64)
+    return Geometry(
+        nodes=nodes[kept],
+        coordinates_m=positions_m[kept],
+        lines=lines_between_neighbours(
+            matrices.stiffness[drawn][:, drawn],
+            [matrices.dofs[row] for row in drawn.tolist()],
+            nodes[kept],
+            positions_m[kept],
+        ),
+        supports=matrices.supports,
+        is_schematic=is_schematic,
+    )
+
+
+def _rows(dofs: Sequence[Dof | str]) -> tuple[Dof, ...]:
+    """Take the DOFs of rows; a generalised one is no DOF that a label names."""
+    if isinstance(dofs, str | Dof) or not isinstance(dofs, Iterable):
+        return as_dofs(dofs, name="dofs")
+    matches = [GENERALISED_LABEL.fullmatch(dof) if isinstance(dof, str) else None for dof in dofs]
+    return tuple(
+        Dof(int(match[1]), GENERALISED) if match else as_dofs([dof], name="dofs")[0].unsigned
+        for dof, match in zip(dofs, matches, strict=True)
+    )
+
+
+@contextmanager
+def _errors_of_matrix(what: str) -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        is_predicate = str(error).startswith(("is ", "holds "))  # which a file's name would precede
+        raise InputError(f"the {what} matrix {error}" if is_predicate else str(error)) from None
+
+
 def _square_matrix(what: str, matrix: ArrayLike | Matrix, order: int) -> Matrix:
     """Take a matrix, dense or sparse, as a sparse one."""
     given: Any = matrix if sparse.issparse(matrix) else np.atleast_2d(np.asarray(matrix))
     if given.shape != (order, order):
         raise ShapeError(f"the {what} matrix is {given.shape}, but {order} DOFs are named; one row a DOF is needed")
-    if given.dtype.kind not in "iuf":
+    if given.dtype.kind not in ("iufc" if what == "stiffness" else "iuf"):
         raise InputError(f"the {what} matrix holds {given.dtype} values; real ones are needed")
-    return sparse.csr_array(given, dtype=np.float64)
-
-
-def _symmetric_block(what: str, matrix: Matrix, rows: IntArray) -> Matrix:
-    try:
-        return symmetrise(matrix[rows][:, rows], rows=rows)
-    except InputError as error:
-        raise InputError(f"the {what} matrix {error}") from None
+    return sparse.csr_array(given, dtype=np.complex128 if given.dtype.kind == "c" else np.float64)
 
 
 def _positions(

@@ -102,6 +102,8 @@ def stated_damping(section: DampingSection | None, mass: Matrix, stiffness: Matr
     no_damping = sparse.csr_array(mass.shape, dtype=np.float64)
     if section is None:
         return np.zeros(0), no_damping
+    if section.loss_factor is not None:
+        return np.array([section.loss_factor / 2]), no_damping
     if section.rayleigh is None:
         return np.array(section.modal_ratio), no_damping
     return np.zeros(0), sparse.csr_array(section.rayleigh.alpha_1_s * mass + section.rayleigh.beta_s * stiffness)

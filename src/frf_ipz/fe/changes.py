@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.dofs import TRANSLATIONS
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.fe.assembly import assemble, assemble_mass_and_stiffness
 from frf_ipz.structure import Part
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import Matrix
     from frf_ipz.dofs import Dof
     from frf_ipz.structure import StructuralModel
-
-TRANSLATIONS = ("x", "y", "z")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,7 +60,8 @@ def with_default_damping(model: StructuralModel, ratio: float | None) -> Structu
     InputError
         If the ratio is negative, or 1 and more.
     """
-    if ratio is None or model.modal_damping.size or model.damping_all.count_nonzero():
+    is_damped = model.modal_damping.size or model.structural_damping_all is not None
+    if ratio is None or is_damped or model.damping_all.count_nonzero():
         return model
     if not 0 <= ratio < 1:
         raise InputError(f"{ratio:g} is no damping ratio of a mode that vibrates; give 0 or more, and less than 1")

@@ -20,13 +20,14 @@ from scipy.sparse import linalg as sparse_linalg
 
 from frf_ipz.arguments import require_type
 from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.dofs import TRANSLATIONS, Dof
 from frf_ipz.errors import ConvergenceError, IllConditionedError, InputError, errors_of_arithmetic
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.global_motions import bending_motions, rigid_body_motions
 from frf_ipz.modes import ModeSet
-from frf_ipz.numerics.factorization import DENSE_ORDER, Factorization, factorize
+from frf_ipz.numerics.factorization import DENSE_ORDER, Factorization, factorize, is_positive_definite
 from frf_ipz.numerics.rounding import printed_decimals
-from frf_ipz.structure import StructuralModel
+from frf_ipz.structure import Geometry, StructuralModel
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import Matrix
@@ -39,6 +40,8 @@ LOST = 1e-6  # of the shift: squares of frequencies below have no digit
 NO_ENERGY = 16.0  # roundings of the sum of all terms' sizes: strain energy below is indistinguishable from zero
 MAX_ROUNDING = 1e-9  # of a stiffness matrix that a condensation has rounded
 PRINTED = 2.0  # roundings of the sum of all terms' sizes: no row of a matrix that is rounded, or cut off, has more
+SHIFT_UP = 10.0  # times, until a stiffness with negative eigenvalues is positive definite with it
+SHIFTS_UP = 40  # of such steps: no negative stiffness is beyond
 SPREAD = 4.0  # half units of the last digit of all terms, added in squares: no sum of rounded terms is farther off
 FREE_ROWS = 0.9  # of the rows lie away from supports, so that a translation strains nothing there
 DEPENDENT = 1e-10  # of the largest weight: a combination of motions below is linearly dependent
@@ -55,15 +58,16 @@ class ModalBasis:
     Parameters
     ----------
     eigenvalues : (n_modes,) array
-        omega^2 in ascending order, (rad/s)^2; exactly 0 for rigid-body modes.
+        omega^2 in ascending order, (rad/s)^2; exactly 0 for rigid-body modes. Negative ones only where the model allows
+        a negative stiffness: with them a mode has two real poles, +-sqrt(-omega^2).
     shapes : (n, n_modes) array
         Mode shapes at the free DOFs, mass-normalised.
     n_rigid : int
-        Number of rigid-body modes.
+        Number of modes that do not vibrate, which come first: those of rigid bodies and of negative stiffness.
     stiffness, mass : (n, n) sparse array
         Matrices of the free DOFs.
     factor : Factorization
-        Of K + shift M.
+        Of K + shift M, between the forces and motions that constraint equations allow.
     shift : float
         tau, (rad/s)^2.
     """
@@ -78,8 +82,13 @@ class ModalBasis:
 
     @property
     def natural_frequency_hz(self) -> FloatArray:
-        """Natural frequencies, (n_modes,) array, Hz."""
-        return np.sqrt(self.eigenvalues) / (2 * np.pi)
+        """Natural frequencies, (n_modes,) array, Hz; that of a negative omega^2 with a minus sign."""
+        return np.sign(self.eigenvalues) * np.sqrt(np.abs(self.eigenvalues)) / (2 * np.pi)
+
+    @property
+    def omega_rad_s(self) -> FloatArray:
+        """Natural frequencies, (n_modes,) array, rad/s; 0 for modes that do not vibrate."""
+        return np.sqrt(np.maximum(self.eigenvalues, 0.0))
 
     def first(self, n_modes: int) -> ModalBasis:
         """Select the lowest modes.
@@ -142,15 +151,16 @@ def solve_modes(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
     model : StructuralModel
         The FE model.
     n_modes : int, optional
-        Number of modes, rigid-body modes included; at most as many as free DOFs.
+        Number of modes, rigid-body modes included; at most as many as free DOFs with mass.
     up_to_hz : float, optional
         Only modes up to this frequency, Hz. With neither of the two, all modes of a model of fewer than 600 DOFs.
 
     Returns
     -------
     ModeSet
-        By ascending frequency, at the free DOFs, mass-normalised; rigid-body modes have the frequency 0. The damping
-        ratios are those that the model states, plus the diagonal of its viscous damping in each mode.
+        By ascending frequency, at the free DOFs, mass-normalised; rigid-body modes have the frequency 0, and those of a
+        negative stiffness, ``omega^2 < 0``, a negative one. The damping ratios are those that the model states, plus
+        the diagonal of its viscous and structural damping in each mode.
 
     Raises
     ------
@@ -198,10 +208,39 @@ def damping_ratios(model: StructuralModel, basis: ModalBasis) -> FloatArray:
     (n_modes,) array
         0 for rigid-body modes.
     """
-    ratios = stated_damping_ratios(model.modal_damping, len(basis.eigenvalues), basis.n_rigid)
+    ratios = mode_damping_ratios(model, basis.eigenvalues, basis.shapes, basis.n_rigid)
     viscous = np.sum(basis.shapes * multiply(model.damping, basis.shapes), 0)
     elastic = slice(basis.n_rigid, None)
     ratios[elastic] += viscous[elastic] / (2 * np.sqrt(basis.eigenvalues[elastic]))
+    return ratios
+
+
+def mode_damping_ratios(
+    model: StructuralModel, eigenvalues: FloatArray, shapes: FloatArray, n_rigid: int
+) -> FloatArray:
+    """Damping ratios of modes without the viscous matrix: those that a model states, and by its structural damping.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The FE model.
+    eigenvalues : (n_modes,) array
+        omega^2, (rad/s)^2.
+    shapes : (n, n_modes) array
+        Mass-normalised, at the free DOFs.
+    n_rigid : int
+        Number of modes that do not vibrate.
+
+    Returns
+    -------
+    (n_modes,) array
+        0 for modes that do not vibrate, and for all where nothing is stated.
+    """
+    ratios = stated_damping_ratios(model.modal_damping, len(eigenvalues), n_rigid)
+    structural = model.structural_damping
+    if structural is not None:
+        lost = np.sum(shapes * multiply(structural, shapes), 0)
+        ratios[n_rigid:] += lost[n_rigid:] / (2 * eigenvalues[n_rigid:])
     return ratios
 
 
@@ -213,12 +252,12 @@ def stated_damping_ratios(modal_damping: FloatArray, n_modes: int, n_rigid: int)
     modal_damping : (n,) array
         Ratios of the elastic modes; the last one holds for all further ones. May be empty.
     n_modes, n_rigid : int
-        Number of modes, and of rigid-body modes among them.
+        Number of modes, and of those that do not vibrate among them.
 
     Returns
     -------
     (n_modes,) array
-        0 for rigid-body modes, and for all where nothing is stated.
+        0 for modes that do not vibrate, and for all where nothing is stated.
     """
     ratios = np.zeros(n_modes)
     if modal_damping.size:
@@ -247,22 +286,24 @@ def solve_basis(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
     InputError, ConvergenceError, IllConditionedError
         As `solve_modes`.
     """
-    order = int(np.count_nonzero(~model.fixed))
-    if order == 0:
+    if model.fixed.all():
         raise InputError(f"every DOF of the model '{model.name}' is held: it has no modes")
+    order = model.n_modes
     if n_modes is not None and not 0 < n_modes <= order:
-        raise InputError(f"{n_modes} modes are requested; the model '{model.name}' has {order} free DOFs")
+        with_mass = "" if order == np.count_nonzero(~model.fixed) else " with a mass of their own"
+        raise InputError(f"{n_modes} modes are requested; the model '{model.name}' has {order} free DOFs{with_mass}")
     if up_to_hz is not None and not up_to_hz > 0:
         raise InputError(f"modes up to {up_to_hz:g} Hz are requested; give a frequency above 0")
-    if order >= DENSE_ORDER and n_modes is None and up_to_hz is None:
+    n_free = int(np.count_nonzero(~model.fixed))
+    if n_free >= DENSE_ORDER and n_modes is None and up_to_hz is None:
         raise InputError(
-            f"the model '{model.name}' has {order} free DOFs: say how many modes, or up to which frequency"
+            f"the model '{model.name}' has {n_free} free DOFs: say how many modes, or up to which frequency"
         )
     for matrix in (model.mass, model.stiffness):
         if not np.isfinite(matrix.data).all():
             raise IllConditionedError(f"the model '{model.name}' has masses or springs beyond any; check their units")
     with errors_of_arithmetic(f"the modes of the model '{model.name}'"):
-        if order < DENSE_ORDER or (n_modes or 0) > order // MANY_MODES:
+        if n_free < DENSE_ORDER or (n_modes or 0) > order // MANY_MODES:
             basis = _solve_dense(model, n_modes or order, up_to_hz)
         else:
             basis = _solve_sparse(model, n_modes, up_to_hz)
@@ -275,58 +316,83 @@ def _solve_dense(model: StructuralModel, n_modes: int, up_to_hz: float | None) -
     """Solve the inverted problem by LAPACK: Cholesky's factor is as right in soft rows as in stiff ones."""
     system = _System.of(model)
     order = system.mass.shape[0]
-    shift, rough = _rough_squares(model, system, (2 * np.pi * SHIFT * _first_elastic_hz(model, system, up_to_hz)) ** 2)
+    shift, rough = _rough_squares(model, system, (2 * np.pi * SHIFT * _first_elastic_hz(system, up_to_hz)) ** 2)
     if up_to_hz is not None:
         # one mode more, so that rounding at the limit loses none
         n_modes = min(n_modes, 1 + int(np.searchsorted(rough, (2 * np.pi * up_to_hz) ** 2)))
     elastic = rough[max(int(np.count_nonzero(rough <= LOST * shift)), system.rigid.shape[1]) :]
-    shift = SHIFT**2 * float(elastic[0]) if elastic.size else shift
+    if elastic.size and rough[0] > -LOST * shift:
+        shift = SHIFT**2 * float(elastic[0])
     shifted = system.stiffness + shift * system.mass
     _, shapes = linalg.eigh(
-        system.mass.toarray(), shifted.toarray(), subset_by_index=[order - min(n_modes, order), order - 1]
+        system.mass.toarray(), shifted.toarray(), subset_by_index=[order - min(n_modes, len(rough)), order - 1]
     )
     shapes = shapes[:, ::-1]
     shapes = shapes / np.sqrt(np.sum(shapes * multiply(system.mass, shapes), 0))
-    return _orthonormalised(model, system, shapes, factorize(shifted, _nodes(model)), shift)
+    return _orthonormalised(model, system, shapes, factorize(shifted, system.node_numbers), shift)
 
 
 def _rough_squares(model: StructuralModel, system: _System, shift: float) -> tuple[float, FloatArray]:
     """omega^2 of all modes, right for those above `LOST` times the shift; and a shift that resolves them."""
-    rough = _squares_at_shift(system, shift)
+    n_modes = model.n_modes
+    rough = _squares_at_shift(system, shift, n_modes)
     if rough is None:
-        lowest = linalg.eigh(
-            system.stiffness.toarray(), system.mass.toarray(), eigvals_only=True, subset_by_index=[0, 0]
-        )
-        raise _indefinite_error(model, float(lowest[0]))
+        shift, rough = _squares_of_indefinite(system, shift, n_modes)
+        if not model.allows_negative_stiffness:
+            raise _indefinite_error(model, float(rough[0]))
+        return shift, rough
     while len(rough) / 2 < np.count_nonzero(rough <= LOST * shift) < len(rough):  # a stiff row has misled the guess
-        lower = _squares_at_shift(system, LOST * shift)
+        lower = _squares_at_shift(system, LOST * shift, n_modes)
         if lower is None:
             break
         shift, rough = LOST * shift, lower
     return shift, rough
 
 
-def _squares_at_shift(system: _System, shift: float) -> FloatArray | None:
+def _squares_of_indefinite(system: _System, shift: float, n_modes: int) -> tuple[float, FloatArray]:
+    """omega^2 of all modes of a stiffness with negative eigenvalues, and a shift that makes it positive definite."""
+    for _ in range(SHIFTS_UP):
+        shift *= SHIFT_UP
+        rough = _squares_at_shift(system, shift, n_modes)
+        if rough is not None:
+            return shift, rough
+    raise np.linalg.LinAlgError
+
+
+def _squares_at_shift(system: _System, shift: float, n_modes: int) -> FloatArray | None:
     """omega^2 of all modes, ascending; None where the shifted stiffness is not positive definite."""
     shifted = (system.stiffness + shift * system.mass).toarray()
     try:
         inverses = linalg.eigh(system.mass.toarray(), shifted, eigvals_only=True)
     except linalg.LinAlgError:
         return None
-    return np.asarray(1 / inverses[::-1] - shift)
+    return np.asarray(1 / inverses[: -n_modes - 1 : -1] - shift)
 
 
 def _solve_sparse(model: StructuralModel, n_modes: int | None, up_to_hz: float | None) -> ModalBasis:
     system = _System.of(model)
-    frequency_hz = _first_shift_hz(model, system, up_to_hz)
+    frequency_hz = _first_shift_hz(system, up_to_hz)
+    if model.allows_negative_stiffness:
+        frequency_hz = _definite_shift_hz(system, frequency_hz)
     try:
         basis = _solve_at_shift(model, system, frequency_hz, n_modes, up_to_hz)
     except ConvergenceError:  # parts of a held structure may be loose all the same: shift them farther from 0
         return _solve_at_shift(model, system, SHIFT / HELD_SHIFT * frequency_hz, n_modes, up_to_hz)
     elastic_hz = basis.natural_frequency_hz[basis.n_rigid :]
-    if elastic_hz.size and not USEFUL_SHIFTS[0] <= frequency_hz / elastic_hz[0] <= USEFUL_SHIFTS[1]:
+    is_far = elastic_hz.size and not USEFUL_SHIFTS[0] <= frequency_hz / elastic_hz[0] <= USEFUL_SHIFTS[1]
+    if is_far and basis.eigenvalues[0] >= 0:
         basis = _solve_at_shift(model, system, SHIFT * float(elastic_hz[0]), n_modes, up_to_hz)
     return basis
+
+
+def _definite_shift_hz(system: _System, frequency_hz: float) -> float:
+    """Raise a shift until the stiffness with it is positive definite, in the place of negative eigenvalues."""
+    for _ in range(SHIFTS_UP):
+        shifted = system.stiffness + (2 * np.pi * frequency_hz) ** 2 * system.mass
+        if is_positive_definite(sparse.csr_array(shifted), system.node_numbers):
+            return frequency_hz
+        frequency_hz *= float(np.sqrt(SHIFT_UP))
+    raise np.linalg.LinAlgError
 
 
 def _solve_at_shift(
@@ -334,8 +400,8 @@ def _solve_at_shift(
 ) -> ModalBasis:
     """Find modes with one factorization; twice as many each time until the highest lies above the limit."""
     shift = (2 * np.pi * frequency_hz) ** 2
-    order = system.mass.shape[0]
-    factor = factorize(system.stiffness + shift * system.mass, _nodes(model))
+    order = model.n_modes
+    factor = factorize(system.stiffness + shift * system.mass, system.node_numbers)
     count = min(n_modes or FIRST_MODES, FIRST_MODES if up_to_hz else order, order - 1)
     while True:
         shapes = _lanczos(system, factor, shift, count)
@@ -361,16 +427,16 @@ def _lanczos(system: _System, factor: Factorization, shift: float, n_modes: int)
     return np.asarray(shapes[:, np.argsort(eigenvalues)])
 
 
-def _first_shift_hz(model: StructuralModel, system: _System, up_to_hz: float | None) -> float:
+def _first_shift_hz(system: _System, up_to_hz: float | None) -> float:
     """Guess a good shift before anything is factored."""
-    _, rigid = _ritz(system, rigid_body_motions(model.dofs, model.geometry))
+    _, rigid = _ritz(system, rigid_body_motions(system.dofs, system.geometry))
     is_free = bool((system.energies(rigid) <= system.energy_uncertainty(rigid)).any())
-    return (SHIFT if is_free else HELD_SHIFT) * _first_elastic_hz(model, system, up_to_hz)
+    return (SHIFT if is_free else HELD_SHIFT) * _first_elastic_hz(system, up_to_hz)
 
 
-def _first_elastic_hz(model: StructuralModel, system: _System, up_to_hz: float | None) -> float:
+def _first_elastic_hz(system: _System, up_to_hz: float | None) -> float:
     """Estimate the first elastic frequency from above, by slow bending of the whole structure."""
-    _, motions = _ritz(system, bending_motions(model.dofs, model.geometry))
+    _, motions = _ritz(system, bending_motions(system.dofs, system.geometry))
     energies = np.abs(system.energies(motions))
     elastic = energies[energies > system.energy_uncertainty(motions)]
     estimate = float(np.sqrt(elastic.min())) / (2 * np.pi) if elastic.size else np.inf
@@ -392,13 +458,17 @@ def _ritz(system: _System, motions: FloatArray) -> tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _System:
-    """Matrices of the free DOFs, and the motions of a rigid body that the structure is free to make.
+    """Matrices of the independent free DOFs, and the motions of a rigid body that the structure is free to make.
 
     Parameters
     ----------
     stiffness, mass : (n, n) sparse array
         The matrices; of a small model printed with few digits, the stiffness without the forces that rounding feigns
         under `rigid`.
+    dofs : tuple of Dof
+        Their rows.
+    geometry : Geometry
+        Where the nodes are.
     rigid : (n, n_rigid) array
         Mass-normalised.
     in_arithmetic, in_print : float
@@ -407,18 +477,26 @@ class _System:
 
     stiffness: Matrix
     mass: Matrix
+    dofs: tuple[Dof, ...]
+    geometry: Geometry
     rigid: FloatArray
     in_arithmetic: float
     in_print: float
 
     @classmethod
     def of(cls, model: StructuralModel) -> _System:
-        stiffness, mass = model.stiffness, model.mass
-        motions = rigid_body_motions(model.dofs, model.geometry)
+        stiffness, mass, dofs = model.stiffness, model.mass, model.dofs
+        admissible = model.free_motions
+        if admissible is not None:
+            stiffness, mass = admissible.reduced(stiffness), admissible.reduced(mass)
+            dofs = tuple(dofs[row] for row in admissible.independent.tolist())
+        motions = rigid_body_motions(dofs, model.geometry)
         in_print = model.rounding if model.rounding > EPS else 0.0
         whole = cls(
             stiffness=stiffness,
             mass=mass,
+            dofs=dofs,
+            geometry=model.geometry,
             rigid=motions[:, :0],
             in_arithmetic=EPS if in_print else _arithmetic_rounding(stiffness, motions),
             in_print=in_print,
@@ -429,12 +507,17 @@ class _System:
         sizes = multiply(abs(stiffness), np.abs(motions) @ np.abs(weights))  # before terms cancel each other
         allowed = max(NO_ENERGY * whole.in_arithmetic, PRINTED * in_print) * sizes
         if in_print:  # then nodes may be printed with few digits too, and rotations are rounded by that
-            allowed += _by_printed_positions(model, stiffness)[:, None] * np.abs(weights[3:]).sum(0)
+            allowed += _by_printed_positions(whole)[:, None] * np.abs(weights[3:]).sum(0)
         rigid = combined[:, (forces <= allowed).all(0)]
         system = replace(whole, rigid=rigid)
         if in_print and mass.shape[0] < DENSE_ORDER:
             return replace(system, stiffness=system.without_feigned_forces())
         return system
+
+    @property
+    def node_numbers(self) -> IntArray:
+        """Node of each row, (n,) array."""
+        return np.array([dof.node for dof in self.dofs])
 
     def without_feigned_forces(self) -> Matrix:
         """Project the stiffness on motions that are orthogonal to the rigid ones in the mass."""
@@ -455,11 +538,11 @@ class _System:
         return np.asarray(np.maximum(NO_ENERGY * self.in_arithmetic * sums, SPREAD * self.in_print * np.sqrt(squares)))
 
 
-def _by_printed_positions(model: StructuralModel, stiffness: Matrix) -> FloatArray:
+def _by_printed_positions(system: _System) -> FloatArray:
     """Largest force on each row under a unit rotation, by the rounding of printed coordinates."""
-    rounding_m = printed_decimals(model.geometry.coordinates_m)
-    moves = np.array([not dof.direction.startswith("r") for dof in model.dofs], float)
-    return PRINTED * rounding_m * multiply(abs(stiffness), moves)
+    rounding_m = printed_decimals(system.geometry.coordinates_m)
+    moves = np.array([dof.direction in TRANSLATIONS for dof in system.dofs], float)
+    return PRINTED * rounding_m * multiply(abs(system.stiffness), moves)
 
 
 def _arithmetic_rounding(stiffness: Matrix, motions: FloatArray) -> float:
@@ -489,23 +572,39 @@ def _orthonormalised(
     eigenvalues = system.energies(shapes)
     eigenvalues[:n_rigid] = 0.0
     uncertainty = system.energy_uncertainty(shapes)
-    if (eigenvalues < -uncertainty).any():
+    if (eigenvalues < -uncertainty).any() and not model.allows_negative_stiffness:
         raise _indefinite_error(model, float(eigenvalues.min()))
-    rigid = eigenvalues <= uncertainty
+    rigid = np.abs(eigenvalues) <= uncertainty
     rigid[:n_rigid] = True
     eigenvalues = np.where(rigid, 0.0, eigenvalues)
     ascending = np.argsort(eigenvalues, kind="stable")
     shapes = shapes[:, ascending]
     top = shapes[np.argmax(np.abs(shapes), 0), np.arange(shapes.shape[1])]
+    stiffness, mass, admissible = system.stiffness, system.mass, model.free_motions
+    if admissible is not None:
+        stiffness, mass = model.stiffness, model.mass
+        shapes, factor = multiply(admissible.matrix, shapes), _Constrained(factor, admissible.matrix)
     return ModalBasis(
         eigenvalues=eigenvalues[ascending],
         shapes=shapes * np.sign(top),
-        n_rigid=int(np.count_nonzero(rigid)),
-        stiffness=system.stiffness,
-        mass=system.mass,
+        n_rigid=int(np.count_nonzero(eigenvalues <= 0)),
+        stiffness=stiffness,
+        mass=mass,
         factor=factor,
         shift=shift,
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Constrained:
+    """Factors between the forces and motions of all DOFs, of which some follow from others."""
+
+    factor: Factorization
+    motions: Matrix
+
+    def solve(self, loads: FloatArray) -> FloatArray:
+        inner = self.factor.solve(multiply(sparse.csr_array(self.motions.T), loads))
+        return multiply(self.motions, inner)
 
 
 def _beside_rigid(system: _System, shapes: FloatArray) -> FloatArray:
@@ -523,9 +622,5 @@ def _beside_rigid(system: _System, shapes: FloatArray) -> FloatArray:
 def _indefinite_error(model: StructuralModel, eigenvalue: float) -> IllConditionedError:
     return IllConditionedError(
         f"the stiffness matrix of the model '{model.name}' is indefinite: a mode has omega^2 = {eigenvalue:.4g}; "
-        "check its springs, loads and units"
+        "check its springs, loads and units; where that is meant, [matrices] allow_negative_stiffness = true takes it"
     )
-
-
-def _nodes(model: StructuralModel) -> IntArray:
-    return np.array([dof.node for dof in model.dofs])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.dofs import GENERALISED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -69,6 +70,7 @@ def bending_motions(dofs: Sequence[Dof], geometry: Geometry) -> FloatArray:
     positions, directions = _positions(dofs, geometry), _direction_numbers(dofs)
     size = float(np.abs(positions).max(initial=0.0)) or 1.0
     scaled = positions / size
+    still = np.zeros((len(directions), 1))
     columns = []
     for along in range(3):
         for powers in MONOMIALS:
@@ -76,7 +78,9 @@ def bending_motions(dofs: Sequence[Dof], geometry: Geometry) -> FloatArray:
             translation = -scaled[:, [along]] * gradient
             translation[:, along] = value
             rotation = np.cross(gradient, np.eye(3)[along]) / size
-            columns.append(np.take_along_axis(np.hstack([translation, rotation]), directions[:, None], axis=1)[:, 0])
+            columns.append(
+                np.take_along_axis(np.hstack([translation, rotation, still]), directions[:, None], axis=1)[:, 0]
+            )
     return np.stack(columns, 1)
 
 
@@ -98,5 +102,5 @@ def _positions(dofs: Sequence[Dof], geometry: Geometry) -> FloatArray:
 
 
 def _direction_numbers(dofs: Sequence[Dof]) -> IntArray:
-    number = {name: index for index, name in enumerate((*AXES, *ROTATIONS))}
+    number = {name: index for index, name in enumerate((*AXES, *ROTATIONS, GENERALISED))}
     return np.array([number[dof.direction] for dof in dofs])

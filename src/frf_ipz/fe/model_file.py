@@ -119,7 +119,7 @@ def read_model(path: str | Path) -> StructuralModel:
     """
     path = as_path(path)
     kind, file = _read_options(path)
-    return kind.read(file, path)
+    return kind.read(file.model.system.options_in_si(file), path)
 
 
 def model_files(path: Path) -> tuple[Path, ...]:
@@ -159,7 +159,7 @@ def model_kinds() -> Mapping[str, Kind]:
     return {module.KIND: module for module in modules}
 
 
-def _read_options(path: Path) -> tuple[Kind, object]:
+def _read_options(path: Path) -> tuple[Kind, Any]:
     head = read_toml(path, _Head, required="model")
     available = model_kinds()
     if head.model.kind not in available:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
 from frf_ipz.option_types import Name, NotNegative, Ratio
 from frf_ipz.toml_files import STRICT
+from frf_ipz.unit_systems import SI, UnitSystem
 
 
 def _as_list(value: Any) -> Any:  # noqa: ANN401 - any content of the file; the type behind it checks
@@ -16,6 +17,23 @@ def _as_list(value: Any) -> Any:  # noqa: ANN401 - any content of the file; the 
 
 
 Ratios = Annotated[tuple[Ratio, ...], BeforeValidator(_as_list), Field(min_length=1)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnitTable:
+    """``units = { length, mass, time }``.
+
+    Parameters
+    ----------
+    length, mass, time : str
+        Units as pint reads them.
+    """
+
+    __pydantic_config__ = STRICT
+
+    length: Name = "m"
+    mass: Name = "kg"
+    time: Name = "s"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,12 +47,30 @@ class ModelSection:
         added to `fe.kinds`.
     name : str
         As the user calls it.
+    units : str or UnitTable
+        What all numbers of the model are in, coordinates and matrices included: ``SI``, ``mm-t-s``, ``mm-kg-ms``,
+        ``in-lbf-s``, or a table such as ``{ length = "mm", mass = "t", time = "s" }`` in units that pint reads. A key
+        that ends in a unit of SI is then in the unit of this system; ``[[port]]`` stays in SI.
+
+    Raises
+    ------
+    ValueError
+        If there is no such system, or a unit cannot be read.
     """
 
     __pydantic_config__ = STRICT
 
     kind: Name
     name: Name = "model"
+    units: str | UnitTable = SI
+
+    def __post_init__(self) -> None:
+        _ = self.system
+
+    @property
+    def system(self) -> UnitSystem:
+        """The system of units."""
+        return UnitSystem.of(self.units if isinstance(self.units, str) else asdict(self.units))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +93,7 @@ class RayleighDamping:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DampingSection:
-    """``[damping]``: one of its two keys.
+    """``[damping]``: one of its keys.
 
     Parameters
     ----------
@@ -66,18 +102,23 @@ class DampingSection:
         further modes, so that one number is one ratio for all.
     rayleigh : RayleighDamping, optional
         Damping matrix made of mass and stiffness.
+    loss_factor : float, optional
+        eta of a stiffness K (1 + i eta): a damping ratio of eta / 2 for all modes, which is right at each resonance.
 
     Raises
     ------
     ValueError
-        If both are given, or none.
+        If none is given, or more than one.
     """
 
     __pydantic_config__ = STRICT
 
     modal_ratio: Ratios = ()
     rayleigh: RayleighDamping | None = None
+    loss_factor: Ratio | None = None
 
     def __post_init__(self) -> None:
-        if bool(self.modal_ratio) == (self.rayleigh is not None):
-            raise ValueError("needs exactly one of modal_ratio and rayleigh; leave the section out for no damping")
+        if bool(self.modal_ratio) + (self.rayleigh is not None) + (self.loss_factor is not None) != 1:
+            raise ValueError(
+                "needs exactly one of modal_ratio, rayleigh and loss_factor; leave the section out for no damping"
+            )

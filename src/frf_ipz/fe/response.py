@@ -14,7 +14,7 @@ import numpy as np
 from frf_ipz.arguments import require_each, require_type, take_array
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.fe.assembly import multiply
-from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_damping_ratios
+from frf_ipz.fe.eigen import ModalBasis, mode_damping_ratios, solve_basis
 from frf_ipz.frf import FrfLabel
 from frf_ipz.numerics.factorization import DENSE_ORDER
 from frf_ipz.numerics.pencils import damped_poles
@@ -180,8 +180,8 @@ def _basis_up_to(model: StructuralModel, s: ComplexArray) -> ModalBasis:
 
 def _modal_damping(model: StructuralModel, basis: ModalBasis) -> FloatArray:
     """Damping in modal coordinates, 2 zeta omega: (n,) where it couples no modes, else (n, n)."""
-    ratios = stated_damping_ratios(model.modal_damping, len(basis.eigenvalues), basis.n_rigid)
-    stated = 2 * ratios * np.sqrt(basis.eigenvalues)
+    ratios = mode_damping_ratios(model, basis.eigenvalues, basis.shapes, basis.n_rigid)
+    stated = 2 * ratios * basis.omega_rad_s
     if not model.damping_all.count_nonzero():
         return stated
     viscous = np.asarray(basis.shapes.T @ multiply(model.damping, basis.shapes))

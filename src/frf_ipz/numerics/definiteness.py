@@ -10,11 +10,12 @@ from scipy.sparse import linalg as sparse_linalg
 
 from frf_ipz.errors import InputError
 from frf_ipz.numerics.factorization import is_positive_definite
+from frf_ipz.numerics.held_rows import NOTHING
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.arrays import FloatArray, IntArray, Matrix
+    from frf_ipz.arrays import BoolArray, FloatArray, IntArray, Matrix
     from frf_ipz.dofs import Dof
 
 DENSE_ORDER = 1000  # up to here all eigenvalues are computed, and the message can name the worst DOF
@@ -79,40 +80,90 @@ def _advice_on_asymmetry(matrix: Matrix) -> str:
     )
 
 
-def require_positive_definite_mass(mass: Matrix, dofs: Sequence[Dof]) -> None:
-    """Refuse a mass matrix that is not positive definite.
+def massless_rows(mass: Matrix) -> BoolArray:
+    """Find the rows of a mass matrix that hold nothing.
 
     Parameters
     ----------
     mass : (n, n) sparse array
         Symmetric.
+
+    Returns
+    -------
+    (n,) bool array
+        True where no entry is larger than zero printed as 1e-30.
+
+    Examples
+    --------
+    >>> massless_rows(sparse.csr_array(np.diag([2.0, 0.0])))
+    array([False,  True])
+    """
+    sizes: FloatArray = np.asarray(abs(mass).sum(axis=1)).ravel()
+    return np.asarray(sizes <= (NOTHING * float(np.median(sizes[sizes > 0])) if sizes.any() else 0.0))
+
+
+def require_mass(mass: Matrix, stiffness: Matrix, dofs: Sequence[Dof]) -> None:
+    """Refuse a mass matrix that is not positive definite beside rows that hold nothing.
+
+    Parameters
+    ----------
+    mass, stiffness : (n, n) sparse array
+        Symmetric.
     dofs : sequence of Dof
-        Its rows.
+        Their rows.
 
     Raises
     ------
     InputError
-        If a DOF has no mass, or a motion has none or a negative one.
+        If no DOF has mass, a motion of those that have some has none or a negative one, or a motion without mass meets
+        no stiffness.
     """
-    diagonal = mass.diagonal()
-    if (diagonal <= 0).any():
-        worst = int(np.argmin(diagonal))
+    diagonal, massless = mass.diagonal(), massless_rows(mass)
+    if massless.all():
+        raise InputError("no DOF has any mass; export the mass matrix that the FE program computes modes with")
+    if (diagonal[~massless] <= 0).any():
+        worst = int(np.argmin(np.where(massless, np.inf, diagonal)))
         raise InputError(
-            f"the DOF {dofs[worst].name} (row {worst + 1}) has the mass {diagonal[worst]:.4g}, and "
-            f"{np.count_nonzero(diagonal <= 0)} DOFs have none above 0; condense massless DOFs in the FE "
-            "program, or give them their (rotary) inertia; DOFs that are held need [matrices] held = 'auto'",
+            f"the DOF {dofs[worst].name} (row {worst + 1}) has the mass {diagonal[worst]:.4g}, which no structure has; "
+            "export the mass matrix that the FE program computes modes with"
         )
-    scale = sparse.diags_array(1 / np.sqrt(diagonal))
-    scaled = sparse.csr_array(scale @ mass @ scale)
-    if mass.shape[0] <= DENSE_ORDER:
+    if massless.any():
+        _require_held_by_stiffness(stiffness, np.flatnonzero(massless), dofs)
+    moving = np.flatnonzero(~massless)
+    scale = sparse.diags_array(1 / np.sqrt(diagonal[moving]))
+    scaled = sparse.csr_array(scale @ mass[moving][:, moving] @ scale)
+    named = [dofs[row] for row in moving.tolist()]
+    if len(named) <= DENSE_ORDER:
         smallest, motion = _smallest_eigenpair(scaled)
-        is_definite, where = smallest > SINGULAR_MASS, f", most of all at the DOF {dofs[int(np.argmax(motion))].name}"
+        is_definite, where = smallest > SINGULAR_MASS, f", most of all at the DOF {named[int(np.argmax(motion))].name}"
     else:
-        is_definite, where = is_positive_definite(_shifted(scaled, -SINGULAR_MASS), _nodes(dofs)), ""
+        is_definite, where = is_positive_definite(_shifted(scaled, -SINGULAR_MASS), _nodes(named)), ""
     if not is_definite:
         raise InputError(
             f"the mass matrix is not positive definite: a motion has no mass or a negative one{where}; "
             "export the mass matrix that the FE program computes modes with",
+        )
+
+
+def _require_held_by_stiffness(stiffness: Matrix, rows: IntArray, dofs: Sequence[Dof]) -> None:
+    """Refuse DOFs without mass that can move without any force."""
+    block = stiffness[rows][:, rows]
+    diagonal = block.diagonal()
+    named = [dofs[row] for row in rows.tolist()]
+    worst = int(np.argmin(diagonal))
+    is_held = bool(diagonal[worst] > 0)
+    if is_held:
+        scale = sparse.diags_array(1 / np.sqrt(diagonal))
+        scaled = sparse.csr_array(scale @ block @ scale)
+        if len(named) <= DENSE_ORDER:
+            smallest, motion = _smallest_eigenpair(scaled)
+            is_held, worst = smallest > SINGULAR_MASS, int(np.argmax(motion))
+        else:
+            is_held = is_positive_definite(_shifted(scaled, -SINGULAR_MASS), _nodes(named))
+    if not is_held:
+        raise InputError(
+            f"DOFs without mass can move without any force, the DOF {named[worst].name} among them: give them a mass "
+            "or a stiffness in the FE program, or hold them"
         )
 
 
@@ -150,9 +201,10 @@ def require_semidefinite(matrix: Matrix, dofs: Sequence[Dof], what: str, *, roun
         shifted = _shifted(scaled, allowed)
         is_semidefinite, where = matrix.nnz == 0 or is_positive_definite(shifted, _nodes(dofs)), ""
     if not is_semidefinite:
+        meant = "; where that is meant, set [matrices] allow_negative_stiffness = true" if what == "stiffness" else ""
         raise InputError(
             f"the {what} matrix is indefinite: it has a negative eigenvalue,{where} beyond rounding. Check units and "
-            "signs of what was exported",
+            f"signs of what was exported{meant}",
         )
 
 

@@ -198,4 +198,6 @@ def _digest_test(test: VibrationTest) -> str:
 
 def _digest_model(model: StructuralModel) -> str:
     matrices = [model.mass_all, model.stiffness_all, model.damping_all, model.modal_damping, model.fixed]
+    further = [model.structural_damping_all, None if model.motions is None else model.motions.matrix]
+    matrices += [matrix for matrix in further if matrix is not None]
     return digest_arrays([*matrices, [str(dof) for dof in model.all_dofs]])

@@ -55,5 +55,5 @@ def test_bending_turns_the_sections_with_the_slope():
 def test_the_first_frequency_is_guessed_to_a_factor_of_two(model):
     frequency = solve_modes(model, n_modes=8).natural_frequency_hz
     first = frequency[frequency > 0][0]
-    guessed = _first_shift_hz(model, _System.of(model), None) / 0.4
+    guessed = _first_shift_hz(_System.of(model), None) / 0.4
     assert first <= guessed <= 2 * first

@@ -182,10 +182,10 @@ MATRIX_CASES = {
         "K.mtx",
         ["not symmetric", "rows 1 and 3"],
     ),
-    "massless DOF": (
-        lambda folder: write_matrix(folder, "M.mtx", lambda mass: mass * np.outer([1, 1, 1, 1, 1, 0], [1] * 5 + [0])),
+    "no mass at all": (
+        lambda folder: write_matrix(folder, "M.mtx", lambda mass: 0 * mass),
         "M.mtx",
-        ["row 6", "4:ry", "condense"],
+        ["no DOF has any"],
     ),
     "singular mass": (
         lambda folder: write_matrix(folder, "M.mtx", lambda mass: np.ones_like(mass)),

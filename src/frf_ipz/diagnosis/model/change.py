@@ -174,6 +174,7 @@ def with_change(model: StructuralModel, change: Change) -> StructuralModel:
         if change.stiffness is None
         else sparse.csr_array(changed.stiffness_all + change.stiffness),
         damping_all=changed.damping_all if change.modal_ratio is None else 0 * changed.damping_all,
+        structural_damping_all=changed.structural_damping_all if change.modal_ratio is None else None,
         modal_damping=stated,
     )
     for attachment in change.attachments:
@@ -220,6 +221,10 @@ def _with_dofs(
     return replace(
         model,
         all_dofs=(*model.all_dofs, *fresh),
+        structural_damping_all=None
+        if model.structural_damping_all is None
+        else _enlarge(model.structural_damping_all, count),
+        motions=None if model.motions is None else model.motions.extended(count),
         fixed=np.concatenate([model.fixed, np.zeros(count, bool)]),
         mass_all=mass,
         stiffness_all=stiffness,

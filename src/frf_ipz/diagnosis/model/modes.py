@@ -17,6 +17,7 @@ from frf_ipz.diagnosis.model.basis import solve_changed_modes
 from frf_ipz.diagnosis.model.layout import make_motion_row
 from frf_ipz.diagnosis.model.nuisance import make_all_shift_rows
 from frf_ipz.dofs import Dof
+from frf_ipz.fe.eigen import mode_damping_ratios
 from frf_ipz.numerics.pencils import generalised_eigh
 
 if TYPE_CHECKING:
@@ -102,6 +103,10 @@ def _ratios(basis: Basis, change: Change, squares: FloatArray) -> FloatArray:
     if change.modal_ratio is not None:
         return np.full(len(squares), change.modal_ratio)
     stated = basis.model.modal_damping
+    if basis.model.structural_damping is not None:
+        of_modes = basis.modes
+        stated = mode_damping_ratios(basis.model, of_modes.eigenvalues, of_modes.shapes, of_modes.n_rigid)
+        stated = stated[of_modes.n_rigid :]
     if not stated.size:
         return np.full(len(squares), MIN_RATIO if not basis.damping.any() else 0.0)
     number = np.maximum(np.arange(len(squares)) - basis.modes.n_rigid, 0)

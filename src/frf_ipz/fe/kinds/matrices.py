@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -15,11 +15,9 @@ from frf_ipz.fe.assembly import stated_damping
 from frf_ipz.fe.matrices.dof_table import DofTable, read_dof_table
 from frf_ipz.fe.matrices.matrix_market import MatrixFile, read_matrix_market
 from frf_ipz.fe.model_options import DampingSection, ModelSection
-from frf_ipz.numerics.definiteness import require_positive_definite_mass, require_semidefinite, symmetrise
-from frf_ipz.numerics.neighbours import lines_between_neighbours
-from frf_ipz.numerics.rounding import printed_rounding
+from frf_ipz.numerics.structural_matrices import MatrixOptions, ModelMatrices
 from frf_ipz.option_types import Name
-from frf_ipz.structure import FreeRows, Geometry, Part, StructuralModel, select_free_rows
+from frf_ipz.structure import Part, StructuralModel, drawn_geometry
 from frf_ipz.toml_files import STRICT
 
 if TYPE_CHECKING:
@@ -71,6 +69,8 @@ class MatricesOptions:
     held : str
         ``auto``: rows that are zero, rows of the identity, and rows with a penalty such as 1e36 on the diagonal are
         held DOFs, which are left out; ``keep``: all rows are taken as they are.
+    allow_negative_stiffness : bool
+        The stiffness may have negative eigenvalues: magnets, buckling. Such a mode has a real pole that is unstable.
     """
 
     __pydantic_config__ = STRICT
@@ -81,6 +81,7 @@ class MatricesOptions:
     damping: Name | None = None
     group: tuple[MatrixGroup, ...] = ()
     held: Literal["auto", "keep"] = "auto"
+    allow_negative_stiffness: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,44 +153,36 @@ def read(file: MatricesFile, path: Path) -> StructuralModel:
     """
     options = file.matrices
     files = _Files(path=path, table=read_dof_table(path.parent / options.dofs), options=options)
-    whole_mass, whole_stiffness = files.read(options.mass), files.read(options.stiffness)
-    table = files.table
-    free = select_free_rows(whole_mass.matrix, whole_stiffness.matrix, table.dofs, held=options.held)
-    mass = files.free_block(options.mass, whole_mass, free)
-    with errors_of_file(path.parent / options.mass):
-        require_positive_definite_mass(mass, free.dofs)
-    stiffness = files.free_block(options.stiffness, whole_stiffness, free)
-    rounding = printed_rounding(whole_stiffness.matrix[free.rows][:, free.rows].data)
-    with errors_of_file(path.parent / options.stiffness):
-        require_semidefinite(stiffness, free.dofs, "stiffness", rounding=rounding)
-    notes = (*whole_mass.notes, *whole_stiffness.notes, *free.notes)
-    modal_damping, damping = stated_damping(file.damping, mass, stiffness)
+    names = {"mass": options.mass, "stiffness": options.stiffness}
     if options.damping is not None:
-        whole_damping = files.read(options.damping)
-        exported = files.free_block(options.damping, whole_damping, free)
-        with errors_of_file(path.parent / options.damping):
-            require_semidefinite(exported, free.dofs, "damping", rounding=printed_rounding(exported.data))
-        damping = sparse.csr_array(damping + exported)
-        notes = (*notes, *whole_damping.notes)
-    return StructuralModel(
-        name=file.model.name,
-        kind=KIND,
-        all_dofs=free.dofs,
-        fixed=np.zeros(len(free.dofs), bool),
-        mass_all=mass,
-        stiffness_all=stiffness,
-        damping_all=damping,
-        modal_damping=modal_damping,
-        geometry=Geometry(
-            nodes=table.nodes,
-            coordinates_m=table.coordinates_m,
-            lines=lines_between_neighbours(whole_stiffness.matrix, table.dofs, table.nodes, table.coordinates_m),
-            supports=free.supports,
+        names["damping"] = options.damping
+    whole = {what: files.read(name) for what, name in names.items()}
+    table, units = files.table, file.model.system
+    matrices = ModelMatrices.of(
+        {what: matrix.matrix for what, matrix in whole.items()},
+        table.dofs,
+        MatrixOptions(
+            held=options.held,
+            units=units,
+            allow_negative_stiffness=options.allow_negative_stiffness,
+            axes=table.axes,
         ),
-        parts=_groups(files, free, mass, stiffness),
-        held_dofs=free.held_dofs,
-        notes=notes,
-        rounding=rounding,
+        errors=lambda what: errors_of_file(path.parent / names.get(what, options.stiffness)),
+    )
+    model = StructuralModel.from_model_matrices(
+        matrices,
+        name=file.model.name,
+        geometry=drawn_geometry(matrices, table.nodes, units.length_m * table.coordinates),
+        modal_damping=np.zeros(0),
+        allow_negative_stiffness=options.allow_negative_stiffness,
+    )
+    modal_damping, damping = stated_damping(file.damping, model.mass, model.stiffness)
+    return replace(
+        model,
+        modal_damping=modal_damping,
+        damping_all=sparse.csr_array(damping + model.damping),
+        parts=_groups(files, matrices),
+        notes=(*(note for matrix in whole.values() for note in matrix.notes), *model.notes),
         source=file,
     )
 
@@ -205,13 +198,13 @@ class _Files:
     def read(self, name: str) -> MatrixFile:
         return read_matrix_market(self.path.parent / name, len(self.table.dofs), self.options.dofs)
 
-    def free_block(self, name: str, file: MatrixFile, free: FreeRows) -> Matrix:
+    def part(self, matrices: ModelMatrices, what: str, name: str) -> Matrix:
         with errors_of_file(self.path.parent / name):
-            return symmetrise(file.matrix[free.rows][:, free.rows], rows=free.rows)
+            return matrices.part(what, self.read(name).matrix)
 
 
-def _groups(files: _Files, free: FreeRows, mass: Matrix, stiffness: Matrix) -> tuple[Part, ...]:
-    options = files.options
+def _groups(files: _Files, matrices: ModelMatrices) -> tuple[Part, ...]:
+    options, mass, stiffness = files.options, matrices.mass, matrices.stiffness
     repeated = next((name for name, count in Counter(group.name for group in options.group).items() if count > 1), None)
     if repeated is not None:
         raise FileFormatError(
@@ -219,19 +212,19 @@ def _groups(files: _Files, free: FreeRows, mass: Matrix, stiffness: Matrix) -> t
         )
     parts, remaining_stiffness, remaining_mass = [], stiffness.diagonal(), mass.diagonal()
     for group in options.group:
-        group_stiffness = files.free_block(group.stiffness, files.read(group.stiffness), free)
+        group_stiffness = files.part(matrices, "stiffness", group.stiffness)
         group_mass = (
-            files.free_block(group.mass, files.read(group.mass), free)
+            files.part(matrices, "mass", group.mass)
             if group.mass is not None
             else sparse.csr_array(stiffness.shape, dtype=np.float64)
         )
-        parts.append(_group_part(group.name, free.dofs, group_mass, group_stiffness))
+        parts.append(_group_part(group.name, matrices.dofs, group_mass, group_stiffness))
         remaining_stiffness = remaining_stiffness - group_stiffness.diagonal()
         remaining_mass = remaining_mass - group_mass.diagonal()
     for what, remaining, whole in (("stiffness", remaining_stiffness, stiffness), ("mass", remaining_mass, mass)):
         excess = -remaining - SUM_TOLERANCE * whole.diagonal()
         if excess.max() > 0:
-            dof = free.dofs[int(np.argmax(excess))]
+            dof = matrices.dofs[int(np.argmax(excess))]
             raise FileFormatError(
                 files.path,
                 f"the groups' {what} adds up to more than the whole at the DOF {dof.name}; groups have to be additive "

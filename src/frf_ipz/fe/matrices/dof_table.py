@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.dofs import DIRECTIONS, Dof
+from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
 from frf_ipz.errors import FileFormatError, did_you_mean, errors_of_file
 from frf_ipz.input_files import read_text
 from frf_ipz.text_numbers import parse_number
@@ -19,9 +19,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 COLUMNS = ("node", "direction", "x_m", "y_m", "z_m")
-SAME_POSITION_M = 1e-9  # coordinates of one node are copies of one number
+SAME_POSITION = 1e-9  # coordinates of one node are copies of one number
 LARGEST_NODE = 2**53  # beyond, neighbours are one number to a spreadsheet
-LARGEST_M = 1e9  # beyond any structure: a coordinate that was meant otherwise
+LARGEST = 1e9  # m or mm, beyond any structure: a coordinate that was meant otherwise
+AXES = ("e1x", "e1y", "e1z", "e2x", "e2y", "e2z")  # first and second axis of a node, where they are its own
+SAME_AXES = 1e-3  # axes are printed with few digits; they are made orthonormal
+NOWHERE = (0.0, 0.0, 0.0)  # where a generalised DOF is
+GENERALISED_DIRECTIONS = (GENERALISED, "0")
+PLAIN = {"x": "x_m", "y": "y_m", "z": "z_m"}  # where lengths are in another unit
 SEPARATORS = (",", ";", "\t")
 
 
@@ -35,13 +40,16 @@ class DofTable:
         One a row.
     nodes : (n_nodes,) int array
         Node numbers, ascending.
-    coordinates_m : (n_nodes, 3) array
-        Their positions.
+    coordinates : (n_nodes, 3) array
+        Their positions, in the unit of the model's length.
+    axes : mapping of int to (3, 3) array
+        Nodes with axes of their own, which are the rows of the array.
     """
 
     dofs: tuple[Dof, ...]
     nodes: IntArray
-    coordinates_m: FloatArray
+    coordinates: FloatArray
+    axes: Mapping[int, FloatArray]
 
 
 def read_dof_table(path: Path) -> DofTable:
@@ -67,6 +75,7 @@ def read_dof_table(path: Path) -> DofTable:
     rows = _csv_rows(lines_of_text, separator, path)
     _, header = next(rows, (1, []))
     columns = _columns(header, path)
+    axes: dict[int, FloatArray] = {}
     lines: dict[Dof, int] = {}
     positions: dict[int, tuple[float, float, float]] = {}
     for number, row in rows:
@@ -83,16 +92,22 @@ def read_dof_table(path: Path) -> DofTable:
         if dof in lines:
             raise FileFormatError(path, f"the DOF {dof.name} is in line {lines[dof]} already", where=where)
         lines[dof] = number
+        own = _read_axes(row, columns, path, where)
+        if own is not None and np.abs(axes.setdefault(dof.node, own) - own).max() > SAME_AXES:
+            raise FileFormatError(path, f"node {dof.node} has other axes in an earlier line", where=where)
+        if dof.direction == GENERALISED:
+            continue
         first = positions.setdefault(dof.node, position)
-        if max(abs(old - new) for old, new in zip(first, position, strict=True)) > SAME_POSITION_M:
+        if max(abs(old - new) for old, new in zip(first, position, strict=True)) > SAME_POSITION:
             raise FileFormatError(path, f"node {dof.node} has other coordinates in an earlier line", where=where)
     if not lines:
         raise FileFormatError(path, "names no DOF; one row a row of the matrices is needed")
-    nodes = sorted(positions)
+    nodes = sorted({dof.node for dof in lines})
     return DofTable(
         dofs=tuple(lines),
         nodes=np.array(nodes),
-        coordinates_m=np.array([positions[node] for node in nodes], dtype=float),
+        coordinates=np.array([positions.get(node, NOWHERE) for node in nodes], dtype=float),
+        axes=axes,
     )
 
 
@@ -107,7 +122,7 @@ def _csv_rows(lines: list[str], separator: str, path: Path) -> Iterator[tuple[in
 
 
 def _columns(header: list[str], path: Path) -> Mapping[str, int]:
-    names = [name.strip().lower() for name in header]
+    names = [PLAIN.get(name.strip().lower(), name.strip().lower()) for name in header]
     columns = {name: index for index, name in enumerate(names)}
     for name in COLUMNS:
         if names.count(name) > 1:
@@ -128,17 +143,41 @@ def _read_row(
     number = int(node[:20]) if node.isascii() and node.isdecimal() else 0
     if not 1 <= number <= LARGEST_NODE:
         raise FileFormatError(path, f"'{node}' is no node number; expected is 1 or more", where=where)
+    if direction.lower() in GENERALISED_DIRECTIONS:
+        return Dof(number, GENERALISED), NOWHERE
     if direction.lower() not in DIRECTIONS:
+        known = (*DIRECTIONS, GENERALISED)
         raise FileFormatError(
-            path, f"'{direction}' is no direction; {did_you_mean(direction.lower(), DIRECTIONS)}", where=where
+            path, f"'{direction}' is no direction; {did_you_mean(direction.lower(), known)}", where=where
         )
     position: list[float] = []
     for name, text in zip(COLUMNS[2:], coordinates, strict=True):
         with errors_of_file(path, where=f"{where}, column '{name}'"):
             position.append(parse_number(text))
-        if abs(position[-1]) > LARGEST_M:
-            raise FileFormatError(
-                path, f"{text} m is farther than any structure reaches; coordinates are in m", where=where
-            )
+        if abs(position[-1]) > LARGEST:
+            raise FileFormatError(path, f"{text} is farther than any structure reaches; check its export", where=where)
     x, y, z = position
     return Dof(number, direction.lower()), (x, y, z)
+
+
+def _read_axes(row: list[str], columns: Mapping[str, int], path: Path, where: str) -> FloatArray | None:
+    """Read a node's own axes; None where they are not given."""
+    present = [name for name in AXES if name in columns]
+    cells = [row[columns[name]].strip() if columns[name] < len(row) else "" for name in present]
+    if not any(cells):
+        return None
+    if len(present) < len(AXES) or not all(cells):
+        raise FileFormatError(path, f"a node's own axes need all of {', '.join(AXES)}", where=where)
+    with errors_of_file(path, where=where):
+        first, second = np.array([parse_number(cell) for cell in cells]).reshape(2, 3)
+    is_orthonormal = (
+        abs(first @ first - 1) <= SAME_AXES
+        and abs(second @ second - 1) <= SAME_AXES
+        and abs(first @ second) <= SAME_AXES
+    )
+    if not is_orthonormal:
+        raise FileFormatError(path, "axes e1 and e2 are needed of length 1 and at right angles", where=where)
+    first = first / np.linalg.norm(first)
+    second = second - (second @ first) * first
+    second = second / np.linalg.norm(second)
+    return np.array([first, second, np.cross(first, second)])

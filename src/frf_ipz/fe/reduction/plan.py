@@ -123,7 +123,7 @@ def _parse_dofs(labels: Sequence[str], key: str) -> tuple[Dof, ...]:
 
 
 def _require_counts(plan: ReductionPlan, model: StructuralModel) -> None:
-    order = int(np.count_nonzero(~model.fixed))
+    order = model.n_modes
     if plan.modes is not None and plan.modes > order:
         raise InputError(f"[reduce] modes is {plan.modes}; the model '{model.name}' has {order} free DOFs")
     if not plan.dofs:

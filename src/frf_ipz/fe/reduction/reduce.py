@@ -18,11 +18,11 @@ from scipy import linalg
 
 from frf_ipz.arguments import require_type
 from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.dofs import Dof, as_dofs
+from frf_ipz.dofs import GENERALISED, TRANSLATIONS, Dof, as_dofs
 from frf_ipz.errors import IllConditionedError, InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.changes import with_default_damping
-from frf_ipz.fe.eigen import ModalBasis, solve_basis, stated_damping_ratios
+from frf_ipz.fe.eigen import ModalBasis, mode_damping_ratios, solve_basis
 from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.fe.reduction.plan import ReductionPlan, plan_reduction
 from frf_ipz.fe.reduction.retained_dofs import MAX_CONDITION, choose_retained_rows, condition_number
@@ -185,12 +185,18 @@ def _solve_retained_modes(
 ) -> ModalBasis:
     if plan.modes is not None:
         return solve_basis(model, n_modes=plan.modes)
-    order = int(np.count_nonzero(~model.fixed))
+    order = model.n_modes
     if plan.dofs:
         count = min(len(plan.dofs) - len(plan.residual), order)
         notes.append(f"modes: {count}, as many as dofs and residual vectors need")
         return solve_basis(model, n_modes=count)
     basis = solve_basis(model, up_to_hz=BAND_MARGIN * band_hz[1])
+    at_nodes = len(_structural_rows(model))
+    if at_nodes < len(model.dofs):
+        order = min(order, max(at_nodes - len(plan.residual), 1))
+    if order < len(basis.eigenvalues):
+        notes.append(f"modes: {order} of {len(basis.eigenvalues)}, as few DOFs of nodes remain beside generalised ones")
+        basis = basis.first(order)
     in_margin = len(basis.eigenvalues)
     rows = max(in_margin, 1) + len(plan.residual)
     allowed = max(MAX_GROWTH * rows, FEW_DOFS)
@@ -228,7 +234,7 @@ def _residual_vectors(model: StructuralModel, basis: ModalBasis, plan: Reduction
     loads[rows, np.arange(len(rows))] = 1.0
     elastic = slice(basis.n_rigid, None)
     in_modes = np.sum(basis.shapes[rows, elastic] ** 2 / basis.eigenvalues[elastic], 1)
-    max_count = len(basis.shapes) - len(basis.eigenvalues)
+    max_count = model.n_modes - len(basis.eigenvalues)
     deflections = basis.residual_flexibility(loads) if max_count else np.zeros_like(loads)
     vectors = np.zeros((len(basis.shapes), 0))
     residual_dofs: list[Dof] = []
@@ -276,7 +282,7 @@ def _chosen_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan) -> In
     """Choose actuators, sensors, points and translations; rotations only where translations do not separate modes."""
     dofs = model.dofs
     required, count = [model.index(dof) for dof in plan.required], ritz.shapes.shape[1]
-    translations = np.array([row for row, dof in enumerate(dofs) if not dof.direction.startswith("r")], dtype=np.int64)
+    translations = np.array([row for row, dof in enumerate(dofs) if dof.direction in TRANSLATIONS], dtype=np.int64)
     if translations.size >= count:
         rows = choose_retained_rows(ritz.shapes, required, translations, count)
         if condition_number(ritz.shapes[rows]) <= MAX_CONDITION:
@@ -284,8 +290,13 @@ def _chosen_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan) -> In
     # rotations have another unit: only the directions of the rows can be compared
     lengths = np.linalg.norm(ritz.shapes, axis=1, keepdims=True)
     return choose_retained_rows(
-        ritz.shapes / np.where(lengths > 0, lengths, 1.0), required, np.arange(len(dofs)), count
+        ritz.shapes / np.where(lengths > 0, lengths, 1.0), required, _structural_rows(model), count
     )
+
+
+def _structural_rows(model: StructuralModel) -> IntArray:
+    """Rows of motions at nodes, without generalised DOFs."""
+    return np.array([row for row, dof in enumerate(model.dofs) if dof.direction != GENERALISED], dtype=np.int64)
 
 
 def _require_condition(model: StructuralModel, ritz: _Ritz, rows: IntArray, plan: ReductionPlan) -> None:
@@ -303,16 +314,21 @@ def _reduced_model(
     model: StructuralModel, ritz: _Ritz, rows: IntArray, plan: ReductionPlan, notes: tuple[str, ...]
 ) -> ReducedModel:
     inverse = linalg.inv(ritz.shapes[rows])
-    mass, stiffness = _gram(inverse), _gram(np.sqrt(ritz.eigenvalues)[:, None] * inverse)
+    omega = np.sqrt(np.abs(ritz.eigenvalues))
+    negative = ritz.eigenvalues < 0
+    mass, stiffness = _gram(inverse), _gram(np.where(negative, 0.0, omega)[:, None] * inverse)
+    if negative.any():
+        stiffness = stiffness - _gram(omega[negative, None] * inverse[negative])
     _require_modes(mass, stiffness, ritz)
-    ratios = stated_damping_ratios(model.modal_damping, len(ritz.eigenvalues), ritz.n_rigid)
-    rates = 2 * ratios * np.sqrt(ritz.eigenvalues)
+    ratios = mode_damping_ratios(model, ritz.eigenvalues, ritz.shapes, ritz.n_rigid)
+    rates = 2 * ratios * omega
     viscous = ritz.shapes.T @ multiply(model.damping, ritz.shapes)
     dashpots = inverse.T @ ((viscous + viscous.T) / 2) @ inverse
     damping = _gram(np.sqrt(rates)[:, None] * inverse) + dashpots
+    rigid = ritz.shapes[rows][:, ritz.eigenvalues == 0]
     states_both = np.any(rates) and np.any(viscous)
     dofs = model.dofs
-    expanded = np.arange(len(dofs)) if len(dofs) <= MAX_EXPANDED else _required_rows(model, rows, plan, ritz)
+    expanded = _structural_rows(model) if len(dofs) <= MAX_EXPANDED else _required_rows(model, rows, plan, ritz)
     expansion = np.asarray(ritz.shapes[expanded] @ inverse)
     return ReducedModel(
         mass=mass,
@@ -325,7 +341,7 @@ def _reduced_model(
         residual_dofs=ritz.residual,
         choices=notes,
         dashpots=(dashpots + dashpots.T) / 2 if states_both else np.zeros((0, 0)),
-        rigid=ritz.shapes[rows, : ritz.n_rigid] if ritz.n_rigid else np.zeros((0, 0)),
+        rigid=rigid if rigid.shape[1] else np.zeros((0, 0)),
     )
 
 

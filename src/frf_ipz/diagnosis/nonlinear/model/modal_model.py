@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import TRANSLATIONS, Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import ModalBasis, damping_ratios, solve_basis
@@ -28,7 +28,6 @@ MODES_TO = 6.0  # times the top of the band: modes that are kept; a stop or fric
 MIN_MODES = 8
 SUSPENSION_PART = 0.01  # of the first elastic frequency: that of a suspension of which nothing is known
 SUSPENSION_DAMPING = 0.03
-TRANSLATIONS = ("x", "y", "z")
 MAX_LOG_CHANGE = 20.0  # of a frequency or damping ratio: a step that diverged must not overflow
 LEAST_DAMPING_PART = 0.5  # of the stated damping: with less, more motion remains at the next impact
 
