@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 UNITS = dict(zip(RESPONSES, ("m", "m/s", "m/s^2"), strict=True))
+TIME_VARIABLE, RATE_VARIABLE = "time", "sample_rate_hz"  # of `variables`, besides the columns of channels
 PARTICULARS = ("operator", "date", "equipment", "customer", "serial_number")  # shown, and used for nothing else
 ROTATIONAL_UNITS = dict(zip(RESPONSES, ("rad", "rad/s", "rad/s^2"), strict=True))
 
@@ -98,6 +99,8 @@ class TestSetup(Concise):
         Where the outputs sit, in the order of the output channels.
     files : tuple of Path
         The recordings, sorted.
+    variables : tuple of pairs of str
+        Columns of channels, ``time`` or ``sample_rate_hz``, and what these files call them.
 
     Examples
     --------
@@ -123,6 +126,43 @@ class TestSetup(Concise):
     input_dof: Dof
     output_dofs: tuple[Dof, ...]
     files: tuple[Path, ...]
+    variables: tuple[tuple[str, str], ...] = ()
+
+    def names_in_files(self, columns: Sequence[str]) -> tuple[str, ...]:
+        """Give what the files call some columns.
+
+        Parameters
+        ----------
+        columns : sequence of str
+            As the channels have them.
+
+        Returns
+        -------
+        tuple of str
+            As the files have them.
+        """
+        called = dict(self.variables)
+        return tuple(called.get(column, column) for column in columns)
+
+    def keys_for_files(self, keys: TableKeys) -> TableKeys:
+        """Add to what the test says of all tables what is said of the time in these files.
+
+        Parameters
+        ----------
+        keys : TableKeys
+            Of the test.
+
+        Returns
+        -------
+        TableKeys
+            Of these files.
+        """
+        called = dict(self.variables)
+        return replace(
+            keys,
+            time_column=called.get(TIME_VARIABLE, keys.time_column),
+            rate_variable=called.get(RATE_VARIABLE, keys.rate_variable),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)

@@ -5,13 +5,21 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from frf_ipz.arguments import require_file
 from frf_ipz.dofs import Dof, as_direction, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean, errors_of_file
 from frf_ipz.frf import FrfLabel
-from frf_ipz.ingest.campaign import PARTICULARS, Channel, TestSetup, VibrationTest, setup_labels
+from frf_ipz.ingest.campaign import (
+    PARTICULARS,
+    RATE_VARIABLE,
+    TIME_VARIABLE,
+    Channel,
+    TestSetup,
+    VibrationTest,
+    setup_labels,
+)
 from frf_ipz.ingest.formats.frf_file import FrfSource, frf_label
 from frf_ipz.ingest.formats.recording import TableKeys
 from frf_ipz.ingest.formats.registry import read_frf_file
@@ -19,6 +27,9 @@ from frf_ipz.ingest.units import sensitivity_factor, unit_factor
 from frf_ipz.option_types import Count, CountOrNone, Day, NotNegative, Positive, Ratio
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.toml_files import STRICT, read_toml
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
 
 ENTRY_OF_KIND = {"hammer": "hit", "random": "record", "frf": "frf"}
 
@@ -120,6 +131,9 @@ class SetupKeys:
         Globs, relative to the file or absolute.
     output_dofs : dict of str to str
         Column of a roving sensor and where it sits in these files.
+    variables : dict of str to str
+        Column of a channel, and what these files call it, where that differs; ``time`` and ``sample_rate_hz`` too.
+        In files of arrays a name, or a column as in ``data(:,2)`` (counted from 1) or ``data[:,1]`` (from 0).
     """
 
     __pydantic_config__ = STRICT
@@ -127,6 +141,7 @@ class SetupKeys:
     dof: str
     files: tuple[str, ...]
     output_dofs: dict[str, str] = field(default_factory=dict)
+    variables: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,8 +156,8 @@ class FrfKeys:
         Displacement, velocity or acceleration over force.
     unit : str, optional
         Of the values; SI where it is left out and the file does not say.
-    output_dof, input_dof : str, optional
-        Needed for a file that does not say what it connects.
+    output_dof, input_dof : str or tuple of str, optional
+        Needed for a file that does not say what it connects; lists for a file of arrays that holds several FRFs.
     columns : tuple of str
         What the columns of a text file with one FRF are: ``frequency_hz``; ``real`` and ``imag``, or ``magnitude`` or
         ``magnitude_db`` with ``phase_deg`` or ``phase_rad``; ``coherence``, ``variance``, ``skip``.
@@ -154,6 +169,10 @@ class FrfKeys:
         Which data sets of a universal file to read, counted from 1; all FRFs where it is left out.
     conjugated : bool
         The file has the time convention exp(-i omega t): its FRFs are the complex conjugate of ours.
+    variables : dict of str to str
+        What stands where in a file of arrays: ``frequency_hz`` or ``frequency_rad_s``, or ``frequency_step_hz`` with
+        ``frequency_start_hz``; ``frf``, or ``real`` and ``imag``, or ``magnitude`` or ``magnitude_db`` with
+        ``phase_deg`` or ``phase_rad``; ``coherence``, ``variance``. Found by names and shapes where it is left out.
     """
 
     __pydantic_config__ = STRICT
@@ -161,13 +180,14 @@ class FrfKeys:
     file: str
     quantity: Literal["receptance", "mobility", "accelerance"]
     unit: str | None = None
-    output_dof: str | None = None
-    input_dof: str | None = None
+    output_dof: str | tuple[str, ...] | None = None
+    input_dof: str | tuple[str, ...] | None = None
     columns: tuple[str, ...] = ()
     skip_rows: CountOrNone = 0
     direction: str = ""
     sets: tuple[Count, ...] = ()
     conjugated: bool = False
+    variables: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -368,7 +388,19 @@ def _read_setup(path: Path, keys: SetupKeys, channels: tuple[Channel, ...], wher
         input_dof=_parse_dof(path, keys.dof, where),
         output_dofs=output_dofs,
         files=tuple(dict.fromkeys(files)),
+        variables=_read_variables(path, keys.variables, [channel.column for channel in channels], where),
     )
+
+
+def _read_variables(
+    path: Path, variables: Mapping[str, str], columns: Iterable[str], where: str
+) -> tuple[tuple[str, str], ...]:
+    known = [*columns, TIME_VARIABLE, RATE_VARIABLE]
+    for name in variables:
+        if name not in known:
+            problem = f"'variables' names '{name}', which is no column of a [[channel]]; {did_you_mean(name, known)}"
+            raise FileFormatError(path, problem, where=where)
+    return tuple(variables.items())
 
 
 def _check_motions(path: Path, outputs: tuple[Channel, ...], dofs: tuple[Dof, ...], where: str) -> None:
@@ -397,8 +429,9 @@ def _read_source(path: Path, keys: FrfKeys) -> FrfSource:
         path=path.parent / keys.file,
         quantity=FrfQuantity(keys.quantity),
         unit=keys.unit or "",
-        output_dof=None if keys.output_dof is None else _parse_dof(path, keys.output_dof, where),
-        input_dof=None if keys.input_dof is None else _parse_dof(path, keys.input_dof, where),
+        output_dofs=_parse_dofs(path, keys.output_dof, where),
+        input_dofs=_parse_dofs(path, keys.input_dof, where),
+        variables=tuple(keys.variables.items()),
         columns=keys.columns,
         skip_rows=keys.skip_rows,
         direction=_parse_direction(path, keys.direction, where),
@@ -410,6 +443,11 @@ def _read_source(path: Path, keys: FrfKeys) -> FrfSource:
 def _parse_direction(path: Path, text: str, where: str) -> str:
     with errors_of_file(path, where=where):
         return as_direction(text)
+
+
+def _parse_dofs(path: Path, texts: str | tuple[str, ...] | None, where: str) -> tuple[Dof, ...]:
+    given = () if texts is None else (texts,) if isinstance(texts, str) else texts
+    return tuple(_parse_dof(path, text, where) for text in given)
 
 
 def _parse_dof(path: Path, text: str, where: str) -> Dof:

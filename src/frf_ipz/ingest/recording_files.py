@@ -43,6 +43,15 @@ class RecordingFiles:
     test: VibrationTest
     _cache: dict[Path, FloatArray] = field(default_factory=dict)
     _cached_bytes: int = 0
+    _notes: dict[str, dict[Path, None]] = field(default_factory=dict)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What had to be chosen in the files that were read so far, each once."""
+        return tuple(
+            f"{next(iter(paths)).name}{f' and {len(paths) - 1} more' if len(paths) > 1 else ''}: {note}"
+            for note, paths in self._notes.items()
+        )
 
     def blocks(self, setup: TestSetup, path: Path) -> Iterator[FloatArray]:
         """Give a recording block by block.
@@ -115,7 +124,10 @@ class RecordingFiles:
 
     def _read(self, setup: TestSetup, path: Path) -> Iterator[FloatArray]:
         channels = self.test.channels
-        recording = open_recording(path, [channel.column for channel in channels], self.test.table)
+        columns = setup.names_in_files([channel.column for channel in channels])
+        recording = open_recording(path, columns, setup.keys_for_files(self.test.table))
+        for note in recording.notes:
+            self._notes.setdefault(note, {})[path] = None
         dofs = (setup.input_dof, *setup.output_dofs)
         factors = [_time_factor(recording)]
         factors += [
@@ -140,6 +152,7 @@ class _UniformTimeCheck:
     def __init__(self, recording: RawRecording) -> None:
         self._path = recording.path
         self._line_of_row = recording.line_of_row
+        self._row_name = recording.row_name
         self._column = recording.time_column
         self._n_rows = 0
         self._last = np.empty(0)
@@ -158,7 +171,7 @@ class _UniformTimeCheck:
                 f"the time is not uniform: a step is {steps[position]:.6g} s where the median is {self._median:.6g} s; "
                 "record with a constant rate, write the time with more digits, or resample; where only the digits of "
                 "the time are too few, write sample_rate_hz = ... under [test]",
-                where=f"line {self._line_of_row(row)}, column '{self._column}'",
+                where=f"{self._row_name} {self._line_of_row(row)}, column '{self._column}'",
             )
         self._n_rows += len(time)
         self._last = time[-1:]

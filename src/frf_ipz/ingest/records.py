@@ -5,7 +5,7 @@ The estimation of FRFs reads them, and the diagnosis, which transforms force and
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TYPE_CHECKING
 
@@ -136,7 +136,8 @@ def survey_records(files: RecordingFiles, options: IngestOptions, progress: Prog
     kind = files.test.kind
     if kind not in SURVEYS:
         raise InputError(f"{files.test.path}: a test of kind '{kind}' has no recordings; there are no records to read")
-    return SURVEYS[kind](files, options, progress)
+    survey = SURVEYS[kind](files, options, progress)
+    return replace(survey, choices=(*files.notes, *survey.choices))
 
 
 def read_records(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arguments import require_file
-from frf_ipz.dofs import as_direction, as_dof
+from frf_ipz.dofs import Dof, as_direction, as_dof
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.frf import FrfSet
 from frf_ipz.ingest.estimation.record_table import empty_record_table
@@ -21,10 +21,9 @@ from frf_ipz.ingest.units import frf_factor
 from frf_ipz.quantities import FrfQuantity, as_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from frf_ipz.arrays import FloatArray, IntArray
-    from frf_ipz.dofs import Dof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.formats.frf_file import MeasuredFrf
@@ -87,14 +86,15 @@ def read_frfs(
     *,
     quantity: FrfQuantity | str = FrfQuantity.ACCELERANCE,
     unit: str = "",
-    output: Dof | str | None = None,
-    input: Dof | str | None = None,
+    output: Dof | str | Sequence[Dof | str] | None = None,
+    input: Dof | str | Sequence[Dof | str] | None = None,
     columns: Sequence[str] = (),
     skip_rows: int = 0,
     direction: str = "",
     conjugated: bool = False,
+    variables: Mapping[str, str] | None = None,
 ) -> FrfSet:
-    """Read the FRFs of one file: CSV, text with named columns, or UFF 58.
+    """Read the FRFs of one file: CSV, text with named columns, UFF 58, MATLAB, HDF5, NumPy or XLSX.
 
     Parameters
     ----------
@@ -104,8 +104,8 @@ def read_frfs(
         What its FRFs are: ``accelerance``, ``mobility`` or ``receptance``.
     unit : str
         Unit of the values, such as ``"g/N"``; what the file states where it is left out, and else SI.
-    output, input : Dof or str, optional
-        What the FRF connects, for a file that does not say so.
+    output, input : Dof or str, or a sequence of them, optional
+        What the FRF connects, for a file that does not say so; several for a file of arrays.
     columns : sequence of str
         What the columns of a text file are, as `columns` of ``[[frf]]`` in ``test.toml``.
     skip_rows : int
@@ -114,6 +114,8 @@ def read_frfs(
         Direction of the ends that have none in a universal file, such as ``"z"``.
     conjugated : bool
         The file has the time convention exp(-i omega t).
+    variables : mapping of str to str, optional
+        What stands where in a file of arrays, as `variables` of ``[[frf]]`` in ``test.toml``.
 
     Returns
     -------
@@ -145,14 +147,21 @@ def read_frfs(
         path=require_file(path),
         quantity=as_quantity(quantity),
         unit=unit,
-        output_dof=None if output is None else as_dof(output),
-        input_dof=None if input is None else as_dof(input),
+        output_dofs=_as_dofs(output),
+        input_dofs=_as_dofs(input),
+        variables=tuple((variables or {}).items()),
         columns=tuple(columns),
         skip_rows=skip_rows,
         direction=as_direction(direction),
         is_conjugated=conjugated,
     )
     return _join([_to_si(frf) for frf in read_frf_source(source)])[0]
+
+
+def _as_dofs(dofs: Dof | str | Sequence[Dof | str] | None) -> tuple[Dof, ...]:
+    if dofs is None:
+        return ()
+    return (as_dof(dofs),) if isinstance(dofs, (Dof, str)) else tuple(map(as_dof, dofs))
 
 
 def _join(frfs: Sequence[MeasuredFrf]) -> tuple[FrfSet, tuple[str, ...]]:

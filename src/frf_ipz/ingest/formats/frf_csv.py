@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from frf_ipz.dofs import Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError
-from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
+from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import TextLayout, sniff
 from frf_ipz.ingest.formats.text_table import column_index, not_a_number, read_blocks
 
@@ -43,6 +43,10 @@ class _LongCsv:
             _make_frf(source, dofs[output], dofs[input_], {name: array[rows] for name, array in values.items()})
             for (output, input_), rows in groups.items()
         )
+
+    def look(self, source: FrfSource) -> FrfContents:
+        frfs = self.read(source)
+        return FrfContents(n_outputs=len(frfs), n_inputs=1, ends=tuple((frf.output_dof, frf.input_dof) for frf in frfs))
 
 
 FORMAT = _LongCsv()

@@ -26,8 +26,8 @@ class FrfSource:
         What its FRFs are.
     unit : str
         Unit of the values; empty for what the file says, or SI.
-    output_dof, input_dof : Dof, optional
-        What the FRF connects where the file does not say so.
+    output_dofs, input_dofs : tuple of Dof
+        What the FRFs connect where the file does not say so: one each for a single FRF.
     columns : tuple of str
         What the columns of a text file are.
     skip_rows : int
@@ -38,18 +38,60 @@ class FrfSource:
         Which data sets of a universal file to read, counted from 1; all FRFs where empty.
     is_conjugated : bool
         The file has the time convention exp(-i omega t).
+    variables : tuple of pairs of str
+        What stands where in a file of arrays, such as ``("frf", "yspec")``.
     """
 
     path: Path
     quantity: FrfQuantity
     unit: str = ""
-    output_dof: Dof | None = None
-    input_dof: Dof | None = None
+    output_dofs: tuple[Dof, ...] = ()
+    input_dofs: tuple[Dof, ...] = ()
     columns: tuple[str, ...] = ()
     skip_rows: int = 0
     direction: str = ""
     sets: tuple[int, ...] = ()
     is_conjugated: bool = False
+    variables: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def output_dof(self) -> Dof | None:
+        """The one output, where there is one."""
+        return self.output_dofs[0] if len(self.output_dofs) == 1 else None
+
+    @property
+    def input_dof(self) -> Dof | None:
+        """The one input, where there is one."""
+        return self.input_dofs[0] if len(self.input_dofs) == 1 else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrfContents:
+    """What a file of FRFs holds, for `init`.
+
+    Parameters
+    ----------
+    n_outputs, n_inputs : int
+        How many.
+    ends : tuple of pairs of Dof
+        What each FRF connects; empty where the file does not say.
+    quantity : FrfQuantity, optional
+        Where the file says it.
+    unit : str
+        What the file says; may be empty.
+    about : str
+        How it was found, where that had to be chosen.
+    lacks_directions : bool
+        Nodes are named without directions.
+    """
+
+    n_outputs: int
+    n_inputs: int
+    ends: tuple[tuple[Dof, Dof], ...] = ()
+    quantity: FrfQuantity | None = None
+    unit: str = ""
+    about: str = ""
+    lacks_directions: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -153,6 +195,25 @@ class FrfFormat(Protocol):
         ------
         FileFormatError
             If it is none, or does not say what its FRFs connect.
+        """
+
+    def look(self, source: FrfSource) -> FrfContents:
+        """Say what a file holds.
+
+        Parameters
+        ----------
+        source : FrfSource
+            The file; nothing is known of it yet.
+
+        Returns
+        -------
+        FrfContents
+            How many FRFs, and what they connect.
+
+        Raises
+        ------
+        FileFormatError
+            If it holds no FRFs.
         """
 
 

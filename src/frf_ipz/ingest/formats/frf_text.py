@@ -7,7 +7,7 @@ import pyarrow as pa
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import FileFormatError, did_you_mean
-from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
+from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import sniff
 from frf_ipz.ingest.formats.text_table import not_a_number, read_blocks
 
@@ -54,6 +54,10 @@ class _TextColumns:
                 notes=note_at_rest(source, source.output_dof, source.input_dof, left_out),
             ),
         )
+
+    def look(self, source: FrfSource) -> FrfContents:
+        _check_columns(source)
+        return FrfContents(n_outputs=1, n_inputs=1)
 
 
 FORMAT = _TextColumns()

@@ -9,7 +9,7 @@ import numpy as np
 
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError, QuantityError
-from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf, note_at_rest
+from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest
 from frf_ipz.ingest.formats.universal_file import (
     COHERENCE,
     FRF,
@@ -46,6 +46,21 @@ class _UniversalFile:
         coherences = {function.ends: function for function in functions if function.function_type == COHERENCE}
         measured = [_make_frf(source, function, coherences.get(function.ends)) for function in frfs]
         return (replace(measured[0], notes=(*measured[0].notes, *notes)), *measured[1:])
+
+    def look(self, source: FrfSource) -> FrfContents:
+        frfs, _ = _select(source, read_functions(source.path, read_bytes(source.path)))
+        ends = [(find_dof(*frf.ends[:2]), find_dof(*frf.ends[2:])) for frf in frfs]
+        known = tuple((output, input_) for output, input_ in ends if output is not None and input_ is not None)
+        kinds = {RESPONSES.get(frf.ordinate.data_type) for frf in frfs}
+        nodes = [node for frf in frfs for node in (frf.response_node, frf.reference_node)]
+        return FrfContents(
+            n_outputs=len(frfs),
+            n_inputs=1,
+            ends=known if len(known) == len(frfs) else (),
+            quantity=kinds.pop() if len(kinds) == 1 else None,
+            unit=frfs[0].ordinate.unit if is_stated(frfs[0].ordinate.unit) else "",
+            lacks_directions=len(known) < len(frfs) and min(nodes) > 0,
+        )
 
 
 FORMAT = _UniversalFile()

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from frf_ipz.arrays import FloatArray
+from frf_ipz.dofs import Dof
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,11 +23,55 @@ class TableKeys:
         Samples a second, for files without a column of time, Hz.
     header_row : int, optional
         Line of the names of the columns, from 1.
+    rate_variable : str
+        Name of the number in a file of arrays that is the rate, in samples a second.
     """
 
     time_column: str = ""
     sample_rate_hz: float | None = None
     header_row: int | None = None
+    rate_variable: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class SignalColumn:
+    """A column of a recording, besides its time.
+
+    Parameters
+    ----------
+    name : str
+        What a ``[[channel]]`` calls it.
+    unit : str
+        What the file says; may be empty.
+    dof : Dof, optional
+        Where it was measured, if the file says so.
+    label : str
+        What the file calls it, where that is not its name.
+    """
+
+    name: str
+    unit: str = ""
+    dof: Dof | None = None
+    label: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordingContents:
+    """What a recording holds, for `init`, `check` and `read_recordings`.
+
+    Parameters
+    ----------
+    columns : tuple of SignalColumn
+        Its signals.
+    has_time : bool
+        The file says when its samples were taken.
+    notes : tuple of str
+        What had to be chosen.
+    """
+
+    columns: tuple[SignalColumn, ...]
+    has_time: bool
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,6 +90,10 @@ class RawRecording:
         Line of the file of a row, for messages.
     time_column : str
         Name of the column of the time, for messages.
+    row_name : str
+        What a row is in the file, for messages.
+    notes : tuple of str
+        What the user has to know of how it was read.
     """
 
     path: Path
@@ -52,6 +101,8 @@ class RawRecording:
     blocks: Iterator[FloatArray]
     line_of_row: Callable[[int], int]
     time_column: str = "time"
+    row_name: str = "line"
+    notes: tuple[str, ...] = ()
 
 
 @runtime_checkable
@@ -103,4 +154,25 @@ class RecordingFormat(Protocol):
         ------
         FileFormatError
             If it is none, or lacks a column.
+        """
+
+    def look(self, path: Path, keys: TableKeys) -> RecordingContents:
+        """Say what a file holds.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        keys : TableKeys
+            What is known about the table.
+
+        Returns
+        -------
+        RecordingContents
+            Its signals, without the time.
+
+        Raises
+        ------
+        FileFormatError
+            If it is no recording.
         """

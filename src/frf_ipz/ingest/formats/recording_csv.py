@@ -11,9 +11,9 @@ import numpy as np
 import pyarrow as pa
 
 from frf_ipz.errors import FileFormatError
-from frf_ipz.ingest.formats.recording import RawRecording
-from frf_ipz.ingest.formats.text_columns import find_columns, no_time, seconds_of_day, unwrap_days
-from frf_ipz.ingest.formats.text_layout import sniff
+from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents, SignalColumn
+from frf_ipz.ingest.formats.text_columns import TIME, find_columns, no_time, seconds_of_day, unwrap_days
+from frf_ipz.ingest.formats.text_layout import is_number, name_and_unit, sniff
 from frf_ipz.ingest.formats.text_table import column_index, line_of_row, not_a_number, read_blocks
 from frf_ipz.ingest.units import unit_factor
 
@@ -56,6 +56,18 @@ class _CsvRecordings:
             line_of_row=lambda row: line_of_row(layout, row),
             time_column="time" if found.time is None else found.names[found.time],
         )
+
+    def look(self, path: Path, keys: TableKeys) -> RecordingContents:
+        layout = sniff(path)
+        found = find_columns(layout, keys)
+        columns = []
+        for index, (name, unit) in enumerate(zip(found.names, found.units, strict=True)):
+            is_time = index == found.time or TIME.match(name) or (index == 0 and found.counts_samples)
+            if is_time or not any(is_number(fields[index]) for fields in layout.rows if index < len(fields)):
+                continue
+            written = name if name and found.names.count(name) == 1 else str(index + 1)
+            columns.append(SignalColumn(name=written, unit=unit, label=name_and_unit(name)[0]))
+        return RecordingContents(columns=tuple(columns), has_time=found.time is not None)
 
 
 FORMAT = _CsvRecordings()

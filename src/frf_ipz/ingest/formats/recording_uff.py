@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.errors import FileFormatError
-from frf_ipz.ingest.formats.recording import RawRecording
+from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents, SignalColumn
 from frf_ipz.ingest.formats.universal_file import (
     TIME_RESPONSE,
     describe_functions,
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.recording import TableKeys
     from frf_ipz.ingest.formats.universal_file import UniversalFunction
 
+QUANTITIES = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13: "force"}  # types of ordinates
+
 
 class _UniversalRecordings:
     """Each time response is a column; it answers to its DOF, to the label of its ordinate and to its number."""
@@ -39,11 +41,7 @@ class _UniversalRecordings:
         if keys.time_column or keys.header_row is not None or keys.sample_rate_hz is not None:
             problem = "is a universal file, which states its time itself; leave out time_column, header_row and"
             raise FileFormatError(path, f"{problem} sample_rate_hz of [test]")
-        functions = read_functions(path, read_bytes(path))
-        responses = [function for function in functions if function.function_type == TIME_RESPONSE]
-        if not responses:
-            problem = f"holds no time response (data set 58 of type 1), but {describe_functions(functions)}"
-            raise FileFormatError(path, f"{problem}; FRFs belong under [[frf]] of a test of kind 'frf'")
+        responses = _read_responses(path)
         chosen = [_find(path, responses, column) for column in columns]
         first = chosen[0] if chosen else responses[0]
         for function in chosen:
@@ -62,8 +60,39 @@ class _UniversalRecordings:
             line_of_row=lambda row: first.line + row,
         )
 
+    def look(self, path: Path, keys: TableKeys) -> RecordingContents:
+        del keys
+        responses = _read_responses(path)
+        names = [_dof(function) for function in responses]
+        return RecordingContents(
+            columns=tuple(
+                SignalColumn(
+                    name=name if names.count(name) == 1 and ":" in name else str(number),
+                    unit=_unit(function.ordinate.unit),
+                    dof=find_dof(*function.ends[:2]),
+                    label=_quantity_of(function),
+                )
+                for number, (name, function) in enumerate(zip(names, responses, strict=True), start=1)
+            ),
+            has_time=True,
+        )
+
 
 FORMAT = _UniversalRecordings()
+
+
+def _read_responses(path: Path) -> list[UniversalFunction]:
+    functions = read_functions(path, read_bytes(path))
+    responses = [function for function in functions if function.function_type == TIME_RESPONSE]
+    if not responses:
+        problem = f"holds no time response (data set 58 of type 1), but {describe_functions(functions)}"
+        raise FileFormatError(path, f"{problem}; FRFs belong under [[frf]] of a test of kind 'frf'")
+    return responses
+
+
+def _quantity_of(function: UniversalFunction) -> str:
+    """Name what is measured: by the type of the ordinate, else by its label."""
+    return QUANTITIES.get(function.ordinate.data_type, function.ordinate.label)
 
 
 def _find(path: Path, responses: Sequence[UniversalFunction], column: str) -> UniversalFunction:

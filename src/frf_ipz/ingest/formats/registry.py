@@ -11,6 +11,7 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest import formats
+from frf_ipz.ingest.formats.file_arrays import ArrayFormat
 from frf_ipz.ingest.formats.frf_file import FrfFormat
 from frf_ipz.ingest.formats.recording import RecordingFormat, TableKeys
 from frf_ipz.ingest.formats.text_layout import read_head
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf
-    from frf_ipz.ingest.formats.recording import RawRecording
+    from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents
 
 
 LARGEST = 1e100  # the square of a larger value may overflow
@@ -84,6 +85,49 @@ def read_frf_file(source: FrfSource) -> tuple[MeasuredFrf, ...]:
     raise FileFormatError(
         source.path, "is of no known format for FRFs; export it as CSV, as text with 'columns', or as UFF 58"
     )
+
+
+def look_at_recording(path: Path, keys: TableKeys | None = None) -> RecordingContents:
+    """Say what a recording of any format holds.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    keys : TableKeys, optional
+        What is known about its table.
+
+    Returns
+    -------
+    RecordingContents
+        Its signals.
+
+    Raises
+    ------
+    FileFormatError
+        If it is no recording.
+    """
+    head = read_head(path)
+    found: RecordingContents = next(
+        candidate for candidate in _formats(RecordingFormat) if candidate.fits(path, head)
+    ).look(path, keys or TableKeys())
+    return found
+
+
+def find_array_format(head: bytes) -> ArrayFormat | None:
+    """Find the format of a file of named arrays.
+
+    Parameters
+    ----------
+    head : bytes
+        Its first bytes.
+
+    Returns
+    -------
+    ArrayFormat or None
+        None where it is no such file.
+    """
+    return next((candidate for candidate in _formats(ArrayFormat) if candidate.recognises(head)), None)
 
 
 def _require_sizes(frf: MeasuredFrf) -> None:

@@ -1,0 +1,183 @@
+"""MATLAB files, versions 4 to 7.3: numbers, texts, structures and cells; objects only MATLAB itself can read.
+
+A file of version 7.3 is an HDF5 file in which structures are groups, cells are references, and axes stand in the
+opposite order.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import lazy_loader
+import numpy as np
+from scipy import sparse
+from scipy.io.matlab import MatlabFunction, MatlabOpaque
+
+from frf_ipz.errors import FileFormatError
+from frf_ipz.ingest.formats.file_arrays import MOST_EXPANDED, ArrayFormat, FileArrays
+from frf_ipz.ingest.formats.foreign_errors import errors_of_reader
+from frf_ipz.ingest.formats.hdf5_tree import SIGNATURE, Hdf5Tree, open_tree
+from frf_ipz.ingest.formats.text_layout import read_head
+from frf_ipz.input_files import require_regular_file
+from frf_ipz.matlab_files import read_matlab
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from frf_ipz.ingest.formats.file_arrays import NumericArray
+
+h5py = lazy_loader.load("h5py")  # slow to load, and most recordings do not need it
+
+KIND = "a MATLAB file"
+N_HEADER = 128  # bytes before the first element, from version 5 on
+HDF5_OFFSET = 512  # bytes before the HDF5 file in one of version 7.3
+DEEPEST = 32  # structures within structures
+MOST_ITEMS = 20_000  # arrays and texts; a recording has some hundred
+V4_BYTES = 20  # of the header of an array
+OBJECTS = "these are objects (tables, timetables, frd, idfrd and the like): in MATLAB save arrays, or s = struct(sys)"
+
+
+def _recognises(head: bytes) -> bool:
+    is_newer = head[:6] == b"MATLAB" and b"MAT-file" in head[:N_HEADER]
+    return is_newer or head[HDF5_OFFSET : HDF5_OFFSET + len(SIGNATURE)] == SIGNATURE or _is_version_4(head)
+
+
+def _is_version_4(head: bytes) -> bool:
+    """Tell a file of version 4, which has no signature, by its first header: type, sizes, and a name."""
+    for order, first in (("<", 0), (">", 1000)):
+        if len(head) < V4_BYTES:
+            return False
+        kind, n_rows, n_columns, is_complex, n_name = struct.unpack_from(f"{order}5i", head)
+        name = head[V4_BYTES : V4_BYTES + max(n_name, 0)]
+        fits = first <= kind <= first + 52 and kind % 10 <= 2 and min(n_rows, n_columns) >= 0 and is_complex in {0, 1}
+        if fits and 2 <= n_name <= 64 and name[-1:] == b"\0" and name[:-1].decode("latin-1").isidentifier():
+            return True
+    return False
+
+
+def _read(path: Path) -> FileArrays:
+    if read_head(path)[HDF5_OFFSET : HDF5_OFFSET + len(SIGNATURE)] == SIGNATURE:
+        return _read_version_7_3(path)
+    found = _Found()
+    size = require_regular_file(path)
+    with errors_of_reader(path, KIND):
+        values = read_matlab(path, most_bytes=max(MOST_EXPANDED, size))
+    for name, value in values.items():
+        if name in {"None", "__function_workspace__"}:  # the contents of objects, which have no name
+            found.has_objects = True
+        elif not name.startswith("__"):
+            found.add(name, value)
+    return found.as_arrays(path)
+
+
+FORMAT = ArrayFormat(rank=4, recognises=_recognises, read=_read)
+
+
+@dataclass(kw_only=True)
+class _Found:
+    """Numbers and texts, by their way through structures and cells."""
+
+    arrays: dict[str, NumericArray] = field(default_factory=dict)
+    texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    unread: list[str] = field(default_factory=list)
+    has_objects: bool = False
+
+    def as_arrays(self, path: Path) -> FileArrays:
+        hint = (OBJECTS,) if self.has_objects else ()
+        unread = (*dict.fromkeys(self.unread), *hint)
+        return FileArrays(path=path, arrays=self.arrays, texts=self.texts, counts_from_one=True, unread=unread)
+
+    def add(self, name: str, value: object) -> None:
+        """Take a value as SciPy gives it."""
+        if len(self.arrays) + len(self.texts) > MOST_ITEMS or sparse.issparse(value):
+            self.unread.append(name)
+        elif not isinstance(value, np.ndarray) or isinstance(value, (MatlabFunction, MatlabOpaque)):
+            self.unread.append(name)
+            self.has_objects = True
+        elif value.dtype.names:
+            self._add_fields(name, value)
+        elif value.dtype.kind == "O":
+            self._add_cells(name, value)
+        elif value.dtype.kind in "US":
+            self.texts[name] = tuple(str(text) for text in value.ravel())
+        elif value.dtype.kind in "biufc":
+            self.arrays[name] = value
+
+    def _add_fields(self, name: str, value: NumericArray) -> None:
+        elements = value.ravel(order="F")
+        for number, element in enumerate(elements, start=1):
+            place = name if len(elements) == 1 else f"{name}({number})"
+            for part in value.dtype.names or ():
+                self.add(f"{place}.{part}", element[part])
+
+    def _add_cells(self, name: str, value: NumericArray) -> None:
+        cells = value.ravel(order="F")
+        said = [_one_text(cell) for cell in cells]
+        if len(said) and all(text is not None for text in said):
+            self.texts[name] = tuple(text or "" for text in said)
+            return
+        for number, cell in enumerate(cells, start=1):
+            self.add(f"{name}{{{number}}}", cell)
+
+
+def _one_text(cell: object) -> str | None:
+    if isinstance(cell, np.ndarray) and cell.dtype.kind in "US" and cell.size <= 1:
+        return str(cell.ravel()[0]) if cell.size else ""
+    return None
+
+
+def _read_version_7_3(path: Path) -> FileArrays:
+    found = _Found()
+    with open_tree(path, KIND) as tree:
+        for name, member in tree.members(tree.file):
+            if not name.startswith("#"):
+                _take_7_3(tree, name, member, found, 0)
+    return found.as_arrays(path)
+
+
+def _take_7_3(tree: Hdf5Tree, name: str, member: Any, found: _Found, depth: int) -> None:  # noqa: ANN401 - of h5py
+    if depth > DEEPEST:
+        raise FileFormatError(tree.path, f"has structures more than {DEEPEST} deep; save the arrays themselves")
+    matlab_class = member.attrs.get("MATLAB_class", b"")
+    matlab_class = matlab_class.decode() if isinstance(matlab_class, bytes) else str(matlab_class)
+    if "MATLAB_object_decode" in member.attrs or matlab_class == "function_handle":
+        found.unread.append(name)
+        found.has_objects = True
+    elif isinstance(member, h5py.Group):
+        if "MATLAB_sparse" in member.attrs:
+            found.unread.append(name)
+            return
+        for part, content in tree.members(member):
+            _take_7_3(tree, f"{name}.{part}", content, found, depth + 1)
+    elif member.attrs.get("MATLAB_empty", 0):
+        return
+    elif h5py.check_ref_dtype(member.dtype) is not None:
+        _take_references(tree, name, member, found, depth)
+    elif matlab_class == "char":
+        rows = np.atleast_2d(tree.read(member).T)
+        found.texts[name] = tuple(row.astype(np.uint16).tobytes().decode("utf-16-le", "replace") for row in rows)
+    else:
+        values = tree.read(member)
+        if values.dtype.kind in "biufc":
+            found.arrays[name] = values.T
+
+
+def _take_references(tree: Hdf5Tree, name: str, member: Any, found: _Found, depth: int) -> None:  # noqa: ANN401
+    """Follow references: those of a cell, or of a field of an array of structures."""
+    is_cell = "MATLAB_class" in member.attrs
+    inner = _Found()
+    for number, reference in enumerate(tree.read(member).ravel(), start=1):
+        tree.count()
+        if reference:
+            way, _, part = name.rpartition(".")
+            place = f"{name}{{{number}}}" if is_cell or not way else f"{way}({number}).{part}"
+            _take_7_3(tree, place, tree.file[reference], inner, depth + 1)
+    if is_cell and inner.texts and not inner.arrays:
+        found.texts[name] = tuple(text for texts in inner.texts.values() for text in texts)
+    else:
+        found.texts |= inner.texts
+    found.arrays |= inner.arrays
+    found.unread += inner.unread
+    found.has_objects |= inner.has_objects

@@ -1,0 +1,418 @@
+"""FRFs in files of arrays: as `modalfrf` returns them, structures of `frd`, `idfrd` and Testlab, or under any names.
+
+Which array holds the FRFs and which the frequencies follows from ``variables`` of the test, else from names and shapes:
+the axis that is as long as the frequencies counts the lines, and the others count outputs, then inputs.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.dofs import Dof, parse_dof
+from frf_ipz.errors import FileFormatError, InputError, did_you_mean
+from frf_ipz.ingest.formats.file_arrays import FileArrays, describe, last_part
+from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
+from frf_ipz.ingest.formats.registry import find_array_format
+from frf_ipz.ingest.formats.testlab_arrays import points_of, testlab_blocks
+from frf_ipz.ingest.formats.text_layout import read_head
+from frf_ipz.ingest.units import frequency_factor
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.ingest.formats.file_arrays import NumericArray
+
+FREQUENCIES = {"frequency_hz": 1.0, "frequency_rad_s": 1.0 / (2.0 * np.pi)}
+PARTS = ("frf", "real", "imag", "magnitude", "magnitude_db", "phase_deg", "phase_rad")
+GRID = ("frequency_step_hz", "frequency_start_hz")
+KNOWN = (*FREQUENCIES, *GRID, *PARTS, "coherence", "variance")
+FREQUENCY = re.compile(r"(f|ff|freq\w*|frf?_?freq\w*|frequenz\w*|hz|f_?(vec|axis|hz)\w*|x)", re.IGNORECASE)
+ANGULAR = re.compile(r"(w|omega\w*|om|rad_?s|w_?(vec|axis)\w*)", re.IGNORECASE)
+COHERENCE = re.compile(r"(coh|gamma2?|cxy)\w*", re.IGNORECASE)
+OUTPUTS = re.compile(r"(output|response|out)_?(dofs?|names?|points?|channels?)", re.IGNORECASE)
+INPUTS = re.compile(r"(input|reference|excitation|in|ref)_?(dofs?|names?|points?|channels?)", re.IGNORECASE)
+RESPONSE_DATA = "ResponseData"  # of frd and idfrd
+FEWEST_LINES = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FrfBlock:
+    """FRFs on common lines.
+
+    Parameters
+    ----------
+    name : str
+        Of the array.
+    frequency_hz : (n_lines,) array
+        Hz.
+    values : (n_lines, n_outputs, n_inputs) complex array
+        In `unit`.
+    ends : sequence of pairs of Dof, optional
+        What each FRF connects, row by row, as far as the file says so.
+    coherence, variance : (n_lines, n_outputs, n_inputs) array, optional
+        Where the file has them.
+    unit : str
+        What the file says; may be empty.
+    about : str
+        How it was found.
+    """
+
+    name: str
+    frequency_hz: FloatArray
+    values: ComplexArray
+    ends: Sequence[tuple[Dof, Dof]] | None = None
+    coherence: FloatArray | None = None
+    variance: FloatArray | None = None
+    unit: str = ""
+    about: str = ""
+
+
+class _ArrayFrfs:
+    """FRFs by name or shape."""
+
+    rank = 4
+
+    def holds(self, source: FrfSource, head: bytes) -> bool:
+        return not source.columns and find_array_format(head) is not None
+
+    def read(self, source: FrfSource) -> tuple[MeasuredFrf, ...]:
+        blocks = find_frfs(source)
+        if len(blocks) > 1 and any(block.ends is None for block in blocks):
+            names = ", ".join(f"'{block.name}' ({describe(block.values)})" for block in blocks)
+            problem = f"holds several arrays that may be FRFs: {names}"
+            way_out = f'say which, as in variables = {{ frf = "{blocks[0].name}" }} of its [[frf]]'
+            raise FileFormatError(source.path, f"{problem}; {way_out}")
+        return tuple(frf for block in blocks for frf in _measured(source, block))
+
+    def look(self, source: FrfSource) -> FrfContents:
+        block = find_frfs(source)[0]
+        return FrfContents(
+            n_outputs=block.values.shape[1],
+            n_inputs=block.values.shape[2],
+            ends=tuple(block.ends or ()),
+            unit=block.unit,
+            about=block.about,
+        )
+
+
+FORMAT = _ArrayFrfs()
+
+
+def find_frfs(source: FrfSource) -> tuple[FrfBlock, ...]:
+    """Find the FRFs among the arrays of a file.
+
+    Parameters
+    ----------
+    source : FrfSource
+        The file as the test describes it.
+
+    Returns
+    -------
+    tuple of FrfBlock
+        At least one.
+
+    Raises
+    ------
+    FileFormatError
+        If nothing can be FRFs, or what `variables` names does not fit.
+    """
+    array_format = find_array_format(read_head(source.path))
+    if array_format is None:
+        raise FileFormatError(source.path, "is no file of arrays")
+    arrays = array_format.read(source.path)
+    variables = dict(source.variables)
+    for key in variables:
+        if key not in KNOWN:
+            problem = f"'variables' of its [[frf]] has the key '{key}'; {did_you_mean(key, KNOWN)}"
+            raise FileFormatError(source.path, problem)
+    if set(variables) & set(PARTS):
+        return (_named_block(arrays, variables),)
+    blocks = [*_testlab_blocks(arrays), *_response_data(arrays)] or _blocks_by_shape(arrays, variables)
+    if not blocks:
+        problem = "holds no complex array with a vector of as many frequencies"
+        way_out = 'name them, as in variables = { frequency_hz = "f", frf = "H" } of its [[frf]]'
+        raise FileFormatError(source.path, f"{problem}; {way_out}. It holds {arrays.listing()}")
+    return tuple(blocks)
+
+
+def _named_block(arrays: FileArrays, variables: Mapping[str, str]) -> FrfBlock:
+    given = {key: arrays.select(name) for key, name in variables.items()}
+    values = _complex_values(arrays, given)
+    name = next(name for key, name in variables.items() if key in PARTS)
+    axes = [key for key in given if key in FREQUENCIES]
+    about = ""
+    if axes:
+        frequency_hz = _vector(arrays, variables[axes[0]], given[axes[0]]) * FREQUENCIES[axes[0]]
+    elif GRID[0] in given:
+        step_hz, start_hz = (_number(arrays, variables.get(key, key), given.get(key, np.zeros(1))) for key in GRID)
+        frequency_hz = start_hz + step_hz * np.arange(max(values.shape))
+    else:
+        found = _find_frequencies(arrays, values.shape, {})
+        if found is None:
+            problem = f"'{name}' is {describe(values)}, and no vector of frequencies is as long"
+            raise FileFormatError(arrays.path, f'{problem}; name it: variables = {{ frequency_hz = "..." }}')
+        frequency_hz, about = found[1], f"the frequencies of '{name}' are in '{found[0]}'"
+    shaped = _lines_first(arrays, name, values, len(frequency_hz))
+    others = {
+        key: np.real(_lines_first(arrays, variables[key], given[key], len(frequency_hz)))
+        for key in ("coherence", "variance")
+        if key in given
+    }
+    return FrfBlock(
+        name=name,
+        frequency_hz=frequency_hz,
+        values=shaped,
+        ends=_ends_beside(arrays, name, shaped.shape[1:]),
+        coherence=others.get("coherence"),
+        variance=others.get("variance"),
+        unit=_unit_beside(arrays, name),
+        about=about,
+    )
+
+
+def _complex_values(arrays: FileArrays, given: Mapping[str, NumericArray]) -> ComplexArray:
+    if "frf" in given:
+        return np.asarray(given["frf"], np.complex128)
+    parts = set(given) & set(PARTS)
+    magnitudes, phases = parts & {"magnitude", "magnitude_db"}, parts & {"phase_deg", "phase_rad"}
+    shapes = {given[key].shape for key in parts}
+    if len(shapes) != 1 or not (parts == {"real", "imag"} or (len(magnitudes) == 1 and len(phases) == 1)):
+        problem = f"'variables' names {', '.join(sorted(parts))}; needed is frf, or real and imag, or a magnitude and a"
+        raise FileFormatError(arrays.path, f"{problem} phase, of one shape")
+    if parts == {"real", "imag"}:
+        return np.asarray(given["real"] + 1j * given["imag"], np.complex128)
+    magnitude = given["magnitude"] if "magnitude" in given else 10.0 ** (given["magnitude_db"] / 20.0)
+    phase = given["phase_rad"] if "phase_rad" in given else np.radians(given["phase_deg"])
+    return np.asarray(magnitude * np.exp(1j * phase), np.complex128)
+
+
+def _vector(arrays: FileArrays, name: str, values: NumericArray) -> FloatArray:
+    flat = np.squeeze(values)
+    if flat.ndim != 1 or np.iscomplexobj(flat):
+        raise FileFormatError(arrays.path, f"'{name}' is {describe(values)}; the frequencies are one real vector")
+    return np.asarray(flat, np.float64)
+
+
+def _number(arrays: FileArrays, name: str, values: NumericArray) -> float:
+    if values.size != 1 or np.iscomplexobj(values):
+        raise FileFormatError(arrays.path, f"'{name}' is {describe(values)}; the start and step are one number each")
+    return float(values.ravel()[0])
+
+
+def _lines_first(
+    arrays: FileArrays, name: str, values: NumericArray, n_lines: int, *, last: bool = False
+) -> NumericArray:
+    """Bring an array to [line, output, input]: the axis that is as long as the frequencies counts the lines."""
+    axes = [axis for axis, size in enumerate(values.shape) if size == n_lines]
+    if not axes or values.ndim > 3:
+        problem = f"'{name}' is {describe(values)}, and there are {n_lines} frequencies: no axis fits"
+        raise FileFormatError(arrays.path, f"{problem}; name others under 'variables'")
+    moved = np.moveaxis(values, axes[-1] if last else axes[0], 0)
+    shape = moved.shape[1:]
+    if len(shape) == 2 or not shape:
+        return np.asarray(moved.reshape(n_lines, *(shape or (1, 1))))
+    return np.asarray(moved.reshape(n_lines, shape[0], 1))
+
+
+def _testlab_blocks(arrays: FileArrays) -> list[FrfBlock]:
+    blocks = []
+    for block in testlab_blocks(arrays):
+        if not np.iscomplexobj(block.values):
+            continue
+        ends = [points_of(name) for name in block.names]
+        known = [(pair[0], pair[1]) for pair in ends if len(pair) == 2]
+        blocks.append(
+            FrfBlock(
+                name=block.name,
+                frequency_hz=block.x,
+                values=np.asarray(block.values[:, :, None], np.complex128),
+                ends=known if len(known) == block.values.shape[1] else None,
+                unit=block.units[0] if block.units and len(set(block.units)) == 1 else "",
+                about=f"FRFs of Testlab in '{block.name}'",
+            )
+        )
+    return blocks
+
+
+def _response_data(arrays: FileArrays) -> list[FrfBlock]:
+    """Read structures made from `frd` and `idfrd` objects: [output, input, line], frequencies in their unit."""
+    blocks = []
+    for key, values in arrays.arrays.items():
+        way = key.removesuffix(RESPONSE_DATA)
+        frequency = arrays.arrays.get(f"{way}Frequency")
+        if way == key or frequency is None:
+            continue
+        unit = "".join(arrays.texts.get(f"{way}FrequencyUnit", ("rad/s",))).replace("TimeUnit", "s")
+        frequency_hz = np.asarray(frequency, np.float64).ravel() * frequency_factor(unit)
+        shaped = _lines_first(arrays, key, np.atleast_3d(np.asarray(values)), len(frequency_hz), last=True)
+        units = [arrays.texts.get(f"{way}{end}Unit", ()) for end in ("Output", "Input")]
+        same = all(len(set(texts)) == 1 and texts[0].strip() for texts in units)
+        blocks.append(
+            FrfBlock(
+                name=key,
+                frequency_hz=frequency_hz,
+                values=np.asarray(shaped, np.complex128),
+                ends=_ends_beside(arrays, key, shaped.shape[1:]),
+                unit=f"({units[0][0]})/({units[1][0]})" if same else "",
+                about=f"FRFs in '{key}' ({describe(values)}), frequencies in {unit}",
+            )
+        )
+    return blocks
+
+
+def _blocks_by_shape(arrays: FileArrays, variables: Mapping[str, str]) -> list[FrfBlock]:
+    blocks = []
+    for name, values in _complex_arrays(arrays):
+        found = _find_frequencies(arrays, values.shape, variables)
+        if found is None or values.ndim > 3:
+            continue
+        frequency_name, frequency_hz = found
+        shaped = _lines_first(arrays, name, values, len(frequency_hz))
+        coherences = [
+            (other, np.real(_lines_first(arrays, other, array, len(frequency_hz))))
+            for other, array in arrays.arrays.items()
+            if COHERENCE.match(last_part(other)) and array.shape == values.shape and not np.iscomplexobj(array)
+        ]
+        about = f"FRFs in '{name}' ({describe(values)}), frequencies in '{frequency_name}'"
+        blocks.append(
+            FrfBlock(
+                name=name,
+                frequency_hz=frequency_hz,
+                values=shaped,
+                ends=_ends_beside(arrays, name, shaped.shape[1:]),
+                coherence=coherences[0][1] if len(coherences) == 1 else None,
+                unit=_unit_beside(arrays, name),
+                about=about + (f", coherence in '{coherences[0][0]}'" if len(coherences) == 1 else ""),
+            )
+        )
+    return blocks
+
+
+def _complex_arrays(arrays: FileArrays) -> list[tuple[str, ComplexArray]]:
+    """Give complex arrays, and pairs of real ones that are called the real and the imaginary part."""
+    found = [
+        (name, np.asarray(array, np.complex128))
+        for name, array in arrays.arrays.items()
+        if np.iscomplexobj(array) and array.size > 1
+    ]
+    for name, array in arrays.arrays.items():
+        match = re.fullmatch(r"(.*?)(real|re)", name, re.IGNORECASE)
+        other = None if match is None else arrays.find(match[1] + {"real": "imag", "re": "im"}[match[2].lower()])
+        if match and other and array.shape == arrays.arrays[other].shape and array.size > 1:
+            found.append((name, np.asarray(array + 1j * arrays.arrays[other], np.complex128)))
+    return found
+
+
+def _find_frequencies(
+    arrays: FileArrays, shape: tuple[int, ...], variables: Mapping[str, str]
+) -> tuple[str, FloatArray] | None:
+    """Find the frequencies of an array: as named, else by a name, else the only vector that ascends and fits."""
+    for key in set(variables) & set(FREQUENCIES):
+        return variables[key], _vector(arrays, variables[key], arrays.select(variables[key])) * FREQUENCIES[key]
+    vectors = {}
+    for name, array in arrays.arrays.items():
+        flat = np.squeeze(array)
+        fits = flat.ndim == 1 and len(flat) in shape and len(flat) >= FEWEST_LINES and not np.iscomplexobj(flat)
+        if fits and (np.diff(flat) > 0).all() and flat[0] >= 0:
+            vectors[name] = np.asarray(flat, np.float64)
+    for pattern, factor in ((FREQUENCY, 1.0), (ANGULAR, FREQUENCIES["frequency_rad_s"])):
+        for name, vector in vectors.items():
+            if pattern.fullmatch(last_part(name)):
+                return name, vector * factor
+    return next(iter(vectors.items())) if len(vectors) == 1 else None
+
+
+def _ends_beside(arrays: FileArrays, name: str, shape: tuple[int, ...]) -> list[tuple[Dof, Dof]] | None:
+    """Read what FRFs connect from lists of DOFs in the same place."""
+    way = name[: -len(last_part(name))]
+    lists = []
+    for pattern in (OUTPUTS, INPUTS):
+        texts = [
+            said for key, said in arrays.texts.items() if key.startswith(way) and pattern.fullmatch(last_part(key))
+        ]
+        dofs = [_parse_all(said) for said in texts]
+        lists.append(next((found for found in dofs if found), None))
+    outputs, inputs = lists
+    if outputs is None or inputs is None:
+        return None
+    return _pairs(outputs, inputs, shape)
+
+
+def _pairs(outputs: Sequence[Dof], inputs: Sequence[Dof], shape: tuple[int, ...]) -> list[tuple[Dof, Dof]] | None:
+    """Match DOFs with the axes of FRFs, output by output; or FRF by FRF where there is one axis for both."""
+    n_outputs, n_inputs = shape
+    if (len(outputs), len(inputs)) == (n_outputs, n_inputs):
+        return [(output, input_) for output in outputs for input_ in inputs]
+    if n_inputs == 1 and len(outputs) == len(inputs) == n_outputs:
+        return list(zip(outputs, inputs, strict=True))
+    if n_inputs == 1 and len(outputs) == 1 and len(inputs) == n_outputs:  # one sensor, several impacts
+        return [(outputs[0], input_) for input_ in inputs]
+    if n_inputs == 1 and len(outputs) * len(inputs) == n_outputs:
+        return [(output, input_) for output in outputs for input_ in inputs]
+    return None
+
+
+def _parse_all(texts: Sequence[str]) -> list[Dof] | None:
+    try:
+        return [parse_dof(text) for text in texts] or None
+    except InputError:
+        return None
+
+
+def _unit_beside(arrays: FileArrays, name: str) -> str:
+    way = name[: -len(last_part(name))]
+    for key in (f"{name}@unit", f"{name}@units", f"{name}.unit", f"{way}unit", f"{way}units", f"{name}_unit"):
+        if len(arrays.texts.get(key, ())) == 1:
+            return arrays.texts[key][0].strip()
+    return ""
+
+
+def _example(count: int) -> str:
+    return '"1:+z"' if count == 1 else f'["1:+z", {"..., " * (count > 2)}"{count}:+z"]'
+
+
+def _measured(source: FrfSource, block: FrfBlock) -> list[MeasuredFrf]:
+    shape = block.values.shape[1:]
+    ends = _pairs(source.output_dofs, source.input_dofs, shape) if source.output_dofs else block.ends
+    if ends is None:
+        n_outputs, n_inputs = shape
+        problem = f"holds FRFs in '{block.name}', {n_outputs} outputs x {n_inputs} inputs on {len(block.values)} lines"
+        example = f"output_dof = {_example(n_outputs)}, input_dof = {_example(n_inputs)}"
+        given = f"; given are {len(source.output_dofs)} and {len(source.input_dofs)}" if source.output_dofs else ""
+        raise FileFormatError(source.path, f"{problem}; say what they connect in its [[frf]]: {example}{given}")
+    frfs = []
+    values = block.values.reshape(len(block.values), -1)
+    coherence, variance = (
+        None if array is None else array.reshape(len(array), -1) for array in (block.coherence, block.variance)
+    )
+    for number, (output_dof, input_dof) in enumerate(ends):
+        one = values[:, number]
+        columns = {"frequency_hz": block.frequency_hz, "real": one.real, "imag": one.imag}
+        left_out = undefined_at_rest(columns)
+        used = ~left_out
+        is_bad = used & ~np.isfinite(one)
+        if is_bad.any():
+            problem = f"the FRF {output_dof} / {input_dof} is not finite at {block.frequency_hz[is_bad][0]:g} Hz"
+            raise FileFormatError(source.path, f"{problem}; correct the file")
+        order = np.flatnonzero(used)[np.argsort(block.frequency_hz[used], kind="stable")]
+        frfs.append(
+            MeasuredFrf(
+                source=source,
+                output_dof=output_dof,
+                input_dof=input_dof,
+                frequency_hz=block.frequency_hz[order],
+                values=one[order],
+                unit=block.unit,
+                coherence=None if coherence is None else coherence[order, number],
+                variance=None if variance is None else variance[order, number],
+                notes=(
+                    *((f"{source.path.name}: {block.about}",) if block.about and not number else ()),
+                    *note_at_rest(source, output_dof, input_dof, left_out),
+                ),
+            )
+        )
+    return frfs
