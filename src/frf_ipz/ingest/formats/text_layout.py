@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from frf_ipz import text_numbers
 from frf_ipz.errors import FileFormatError
+from frf_ipz.ingest.formats.spreadsheet import is_spreadsheet, spreadsheet_text
 from frf_ipz.input_files import open_input, read_bytes
 
 if TYPE_CHECKING:
@@ -146,7 +147,7 @@ def sniff(path: Path, *, skip_rows: int = 0) -> TextLayout:
 
 @contextmanager
 def open_text(path: Path) -> Iterator[BinaryIO]:
-    """Open a text file as bytes in UTF-8 or Latin-1: from its first letter, and UTF-16 brought to UTF-8.
+    """Open a text file as bytes in UTF-8 or Latin-1: from its first letter; UTF-16 and spreadsheets brought to UTF-8.
 
     Parameters
     ----------
@@ -159,12 +160,15 @@ def open_text(path: Path) -> Iterator[BinaryIO]:
         Can be moved in.
     """
     with open_input(path) as stream:
-        mark = stream.read(4)
-        encoding = _wide_encoding(mark)
-        if not encoding:
+        head = stream.read(HEAD)
+        encoding = _wide_encoding(head[:4])
+        if not encoding and not is_spreadsheet(head):
             stream.seek(0)
             yield stream
             return
+    if not encoding:
+        yield io.BytesIO(spreadsheet_text(path, read_bytes(path)))
+        return
     try:
         text = read_bytes(path).decode(encoding).removeprefix("\ufeff")
     except UnicodeDecodeError:
@@ -180,7 +184,7 @@ def _wide_encoding(mark: bytes) -> str:
 
 
 def read_head(path: Path) -> bytes:
-    """Read the first bytes of a file.
+    """Read the first bytes of a file; of a spreadsheet, those of its text.
 
     Parameters
     ----------
@@ -201,7 +205,7 @@ def read_head(path: Path) -> bytes:
         head = stream.read(HEAD)
     if not head.strip():
         raise FileFormatError(path, EMPTY)
-    return head
+    return spreadsheet_text(path, read_bytes(path))[:HEAD] if is_spreadsheet(head) else head
 
 
 def decode(data: bytes) -> str:

@@ -1,0 +1,73 @@
+"""Recordings as ASAM MDF, versions 3 and 4: channels by name, each on the time of its group.
+
+Numbers are converted by factor and offset only; a conversion by a formula of the file would be run as code, and is not.
+"""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from frf_ipz.errors import FileFormatError
+from frf_ipz.ingest.formats.file_arrays import require_size
+from frf_ipz.ingest.formats.foreign_errors import errors_of_reader, import_reader
+from frf_ipz.ingest.formats.signal_table import Signal, SignalFormat, SignalTable
+from frf_ipz.input_files import read_bytes
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from frf_ipz.ingest.formats.recording import TableKeys
+
+KIND = "an MDF file"
+LINEAR = {"3": {0, 65535}, "4": {0, 1}}  # types of conversions: by factor and offset, or none
+
+
+def _recognises(head: bytes) -> bool:
+    return head.startswith((b"MDF     ", b"UnFinMF "))
+
+
+def _read(path: Path, keys: TableKeys) -> SignalTable:
+    del keys
+    asammdf = import_reader(path, "asammdf", kind=KIND, extra="mdf")
+    data = read_bytes(path)
+    signals: list[Signal] = []
+    with errors_of_reader(path, KIND), asammdf.MDF(io.BytesIO(data)) as content:
+        linear = LINEAR.get(content.version[0], set())
+        sizes = [group.channel_group.cycles_nr * 8 * len(group.channels) for group in content.groups]
+        require_size(path, sum(sizes), len(data))
+        names = Counter(channel.name for group in content.groups for channel in group.channels)
+        for number, group in enumerate(content.groups):
+            for place, channel in enumerate(group.channels):
+                if place == content.masters_db.get(number):
+                    continue
+                signal = content.get(group=number, index=place, raw=True)
+                name = channel.name if names[channel.name] == 1 else f"{channel.name} #{number + 1}"
+                values = _physical(path, name, signal, linear)
+                if values.dtype.kind in "biuf" and values.ndim == 1 and len(values):
+                    signals.append(
+                        Signal(
+                            name=name,
+                            values=values.astype(np.float64),
+                            unit=str(signal.unit or "").strip(),
+                            time=np.asarray(signal.timestamps, np.float64),
+                        )
+                    )
+    return SignalTable(path=path, signals=tuple(signals))
+
+
+FORMAT = SignalFormat(rank=10, recognises=_recognises, read=_read)
+
+
+def _physical(path: Path, name: str, signal: Any, linear: set[int]) -> Any:  # noqa: ANN401 - as asammdf has them
+    if signal.conversion is None:
+        return np.asarray(signal.samples)
+    if signal.conversion.conversion_type not in linear:
+        if signal.samples.dtype.kind not in "biuf":
+            return np.asarray(signal.samples)
+        problem = f"converts '{name}' by a formula or a table"
+        raise FileFormatError(path, f"{problem}, and only factor and offset are read; export it in physical values")
+    return np.asarray(signal.physical().samples)

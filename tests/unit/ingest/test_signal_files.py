@@ -1,0 +1,211 @@
+"""Recordings in files of acquisition programs: LabVIEW, TDMS, WAV, MDF, spreadsheets."""
+
+import io
+import struct
+import wave
+import zipfile
+
+import numpy as np
+import openpyxl
+import pytest
+
+import frf_ipz
+from frf_ipz.errors import InputError
+from frf_ipz.ingest.formats.recording import TableKeys
+from frf_ipz.ingest.formats.registry import look_at_recording, open_recording
+from synthetic_campaign import Structure, impact
+
+RATE_HZ = 2048.0
+SIGNALS = impact(Structure(), n_samples=512)
+NAMES, UNITS = ("force", "acc_1", "acc_2"), ("N", "m/s^2", "m/s^2")
+TIME = np.arange(512) / RATE_HZ
+DIGITS = 1e-15  # relative: openpyxl writes 16 digits
+
+
+def write_lvm(path, signals=SIGNALS, decimal=".", columns="No", segments=1):
+    def number(value):
+        return f"{value:.17g}".replace(".", decimal)
+
+    lines = ["LabVIEW Measurement\t", "Writer_Version\t2", "Reader_Version\t2", "Separator\tTab"]
+    lines += [f"Decimal_Separator\t{decimal}", "Multi_Headings\tYes", f"X_Columns\t{columns}", "Time_Pref\tRelative"]
+    lines += ["Operator\tA. Meier", "Date\t2026/11/27", "Time\t10:00:00", "***End_of_Header***\t", "\t"]
+    for _ in range(segments):
+        lines += ["Channels\t3\t\t\t", "Samples\t" + "\t".join(["512"] * 3), "Date\t" + "\t".join(["2026/11/27"] * 3)]
+        lines += ["Y_Unit_Label\t" + "\t".join(UNITS), "X_Dimension\t" + "\t".join(["Time"] * 3)]
+        lines += ["X0\t" + "\t".join([number(0.0)] * 3), "Delta_X\t" + "\t".join([number(1 / RATE_HZ)] * 3)]
+        lines += ["***End_of_Header***\t\t\t", "X_Value\t" + "\t".join(NAMES) + "\tComment"]
+        for time, row in zip(TIME, signals.T, strict=True):
+            first = number(time) if columns == "One" else ""
+            lines.append("\t".join([first, *map(number, row)]))
+        lines += [""]
+    path.write_text("\r\n".join(lines) + "\r\n")
+
+
+def write_tdms(path):
+    nptdms = pytest.importorskip("nptdms")
+    channels = [
+        nptdms.ChannelObject("hammer test", name, values, {"wf_increment": 1 / RATE_HZ, "unit_string": unit})
+        for name, unit, values in zip(NAMES, UNITS, SIGNALS, strict=True)
+    ]
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment(channels)
+
+
+def write_mdf(path):
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as content:
+        content.append(
+            [
+                asammdf.Signal(values, TIME, name=name, unit=unit)
+                for name, unit, values in zip(NAMES, UNITS, SIGNALS, strict=True)
+            ]
+        )
+        content.save(path, overwrite=True, compression=2)
+
+
+def write_xlsx(path):
+    book = openpyxl.Workbook()
+    book.active.append(["A note that is no table"])
+    sheet = book.create_sheet("data")
+    sheet.append(["Date", "2026-11-27"])
+    sheet.append([])
+    sheet.append(["Time [s]", *(f"{name} [{unit}]" for name, unit in zip(NAMES, UNITS, strict=True))])
+    for row in np.column_stack([TIME, SIGNALS.T]).tolist():
+        sheet.append(row)
+    book.save(path)
+
+
+WRITERS = {"a.lvm": write_lvm, "a.tdms": write_tdms, "a.mf4": write_mdf, "a.xlsx": write_xlsx}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_names_units_time_and_numbers(tmp_path, name):
+    WRITERS[name](tmp_path / name)
+    (tmp_path / name).rename(tmp_path / "some file")  # told by its content
+    contents = look_at_recording(tmp_path / "some file")
+    assert [(column.label, column.unit) for column in contents.columns] == list(zip(NAMES, UNITS, strict=True))
+    assert contents.has_time
+    recording = open_recording(tmp_path / "some file", [column.name for column in contents.columns])
+    table = np.concatenate(list(recording.blocks))
+    np.testing.assert_allclose(table[:, 0], TIME, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(table[:, 1:].T, SIGNALS, rtol=DIGITS)
+    assert recording.units[1:] == UNITS
+
+
+@pytest.mark.parametrize(("decimal", "columns"), [(",", "No"), (".", "One"), (",", "One")])
+def test_variants_of_labview(tmp_path, decimal, columns):
+    write_lvm(tmp_path / "a.lvm", decimal=decimal, columns=columns)
+    table = next(open_recording(tmp_path / "a.lvm", NAMES).blocks)
+    np.testing.assert_allclose(table, np.column_stack([TIME, SIGNALS.T]), rtol=1e-14)
+
+
+def test_segments_of_labview_are_records_of_their_own(tmp_path):
+    write_lvm(tmp_path / "a.lvm", segments=2)
+    contents = look_at_recording(tmp_path / "a.lvm")
+    assert [column.name for column in contents.columns] == [*NAMES, *(f"{name} #2" for name in NAMES)]
+    assert "2 segments" in contents.notes[0]
+    table = next(open_recording(tmp_path / "a.lvm", ["force #2", "acc_1 #2"]).blocks)
+    np.testing.assert_array_equal(table[:, 1:].T, SIGNALS[:2])
+
+
+@pytest.mark.parametrize("width", [1, 2, 4])
+def test_wav_is_fractions_of_full_scale(tmp_path, width):
+    whole = 2.0 ** (8 * width - 1)
+    scaled = np.round(SIGNALS[:2] / abs(SIGNALS).max() * (whole - 1))
+    integers = (scaled + whole).astype("u1") if width == 1 else scaled.astype(f"<i{width}")
+    with wave.open(str(tmp_path / "a.wav"), "wb") as file:
+        file.setnchannels(2)
+        file.setsampwidth(width)
+        file.setframerate(int(RATE_HZ))
+        file.writeframes(integers.T.tobytes())
+    table = next(open_recording(tmp_path / "a.wav", ["1", "channel 2"]).blocks)
+    np.testing.assert_allclose(table[:, 0], TIME, rtol=1e-12)
+    np.testing.assert_array_equal(table[:, 1:].T, scaled / whole)
+
+
+def test_numbers_of_a_channel_and_rates_that_contradict(tmp_path):
+    write_lvm(tmp_path / "a.lvm")
+    table = next(open_recording(tmp_path / "a.lvm", ["2", "1"]).blocks)
+    np.testing.assert_array_equal(table[:, 1:].T, SIGNALS[[1, 0]])
+    with pytest.raises(InputError, match=r"sample_rate_hz = 1000, but the file's own time.*2048 Hz"):
+        open_recording(tmp_path / "a.lvm", NAMES, TableKeys(sample_rate_hz=1000.0))
+    with pytest.raises(InputError, match="no signal 'acc_3'; did you mean 'acc_"):
+        open_recording(tmp_path / "a.lvm", ["acc_3"])
+
+
+def test_a_missing_reader_names_its_extra(tmp_path, monkeypatch):
+    (tmp_path / "a.tdms").write_bytes(b"TDSm" + bytes(64))
+    monkeypatch.setitem(__import__("sys").modules, "nptdms", None)
+    with pytest.raises(InputError, match=r"pip install 'frf_ipz\[tdms\]'"):
+        look_at_recording(tmp_path / "a.tdms")
+
+
+def test_a_formula_of_an_mdf_file_is_not_run(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as content:
+        values = np.arange(64)
+        conversion = {"formula": "__import__('os').getpid() + X1"}
+        content.append([asammdf.Signal(values, values / 100.0, name="force", conversion=conversion)])
+        content.save(tmp_path / "a.mf4", overwrite=True)
+    with pytest.raises(InputError, match="'force' by a formula or a table"):
+        look_at_recording(tmp_path / "a.mf4")
+
+
+def test_a_spreadsheet_that_defines_entities_or_is_a_bomb_is_refused(tmp_path):
+    write_xlsx(tmp_path / "a.xlsx")
+    with zipfile.ZipFile(tmp_path / "a.xlsx") as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    sheet = "xl/worksheets/sheet1.xml"
+    attack = b'<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaa">]>' + parts[sheet]
+    with zipfile.ZipFile(tmp_path / "b.xlsx", "w") as archive:
+        for name, part in (parts | {sheet: attack}).items():
+            archive.writestr(name, part)
+    with pytest.raises(InputError, match="defines entities"):
+        look_at_recording(tmp_path / "b.xlsx")
+    data = bytearray((tmp_path / "a.xlsx").read_bytes())
+    place = data.rindex(b"PK\x01\x02")  # the last entry of the directory: state that it is huge
+    data[place + 24 : place + 28] = struct.pack("<I", 0xFFFFFFFE)
+    (tmp_path / "c.xlsx").write_bytes(bytes(data))
+    with pytest.raises(InputError, match="MB of numbers in a file of"):
+        look_at_recording(tmp_path / "c.xlsx")
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of the destructor of asammdf
+@pytest.mark.parametrize("name", WRITERS)
+def test_damaged_files_are_one_line(tmp_path, name):
+    WRITERS[name](tmp_path / name)
+    whole = (tmp_path / name).read_bytes()
+    rng = np.random.default_rng(1)
+    changed = [whole[: int(cut)] for cut in rng.integers(60, len(whole) - 1, 3)]
+    for _ in range(12):
+        data = bytearray(whole)
+        data[int(rng.integers(0, len(data)))] = int(rng.integers(256))
+        changed.append(bytes(data))
+    for data in changed:
+        (tmp_path / name).write_bytes(data)
+        try:
+            contents = look_at_recording(tmp_path / name)
+            next(open_recording(tmp_path / name, [contents.columns[0].name]).blocks)
+        except InputError:
+            continue
+
+
+def test_frfs_in_a_spreadsheet(tmp_path):
+    book = openpyxl.Workbook()
+    book.active.append(["frequency_hz", "output_dof", "input_dof", "real", "imag"])
+    for line in range(1, 30):
+        book.active.append([line, "1:+z", "2:+z", 1.0 / line, -0.1])
+    stream = io.BytesIO()
+    book.save(stream)
+    (tmp_path / "frf.xlsx").write_bytes(stream.getvalue())
+    frfs = frf_ipz.read_frfs(tmp_path / "frf.xlsx", quantity="receptance")
+    np.testing.assert_allclose(frfs.values[:, 0], 1.0 / np.arange(1, 30) - 0.1j, rtol=DIGITS)
+
+
+def test_a_file_of_labview_that_was_thinned_out_keeps_its_own_times(tmp_path):
+    write_lvm(tmp_path / "a.lvm", columns="One")
+    lines = (tmp_path / "a.lvm").read_text().splitlines()
+    first = next(number for number, line in enumerate(lines) if line.startswith("X_Value")) + 1
+    (tmp_path / "a.lvm").write_text("\n".join([*lines[:first], *lines[first::16]]) + "\n")
+    table = next(open_recording(tmp_path / "a.lvm", ["force"]).blocks)
+    np.testing.assert_allclose(table[:, 0], TIME[::16], rtol=1e-12)
