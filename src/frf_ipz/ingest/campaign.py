@@ -483,6 +483,11 @@ class VibrationTest(Concise):
         return tuple((setup, path) for setup in self.setups for path in setup.files)
 
     @property
+    def has_frf_levels(self) -> bool:
+        """Whether FRFs that were estimated elsewhere are given at several levels of excitation."""
+        return len({source.level_N for source in self.frf_sources} - {None}) > 1
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """All files of measurements, each once."""
         recordings = [path for _, path in self.recordings if path not in self.signals]

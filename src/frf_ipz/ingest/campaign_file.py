@@ -173,6 +173,9 @@ class FrfKeys:
         What stands where in a file of arrays: ``frequency_hz`` or ``frequency_rad_s``, or ``frequency_step_hz`` with
         ``frequency_start_hz``; ``frf``, or ``real`` and ``imag``, or ``magnitude`` or ``magnitude_db`` with
         ``phase_deg`` or ``phase_rad``; ``coherence``, ``variance``. Found by names and shapes where it is left out.
+    level : float, optional
+        Amplitude of the excitation, N, where the test holds the same FRFs at several: the fit is of the weakest, and
+        the others show how its modes move.
     """
 
     __pydantic_config__ = STRICT
@@ -188,6 +191,7 @@ class FrfKeys:
     sets: tuple[Count, ...] = ()
     conjugated: bool = False
     variables: dict[str, str] = field(default_factory=dict)
+    level: Positive | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -437,6 +441,7 @@ def _read_source(path: Path, keys: FrfKeys) -> FrfSource:
         direction=_parse_direction(path, keys.direction, where),
         sets=keys.sets,
         is_conjugated=keys.conjugated,
+        level_N=keys.level,
     )
 
 

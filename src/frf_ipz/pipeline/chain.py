@@ -60,13 +60,16 @@ def chain(
         diagnosis = mismatch.diagnose(runner, model, frfs, is_asked=is_asked)
         model, frfs = mismatch.apply_diagnosis(runner, model, frfs, diagnosis)
     fit = measurement.fit(runner, frfs, corrected_by=diagnosis)
+    if inputs.test.has_frf_levels:
+        mismatch.levels(runner, fit, recordings.frfs)
     yield "fit"
     if model is not None:
         modelling.outline(runner, model, corrected_by=diagnosis)
         if is_diagnosing or is_known:
             if diagnosis is None:
                 found = mismatch.diagnose(runner, model, frfs, is_asked=is_asked)
-            mismatch.levels(runner, fit, recordings.frfs)
+            if not inputs.test.has_frf_levels:
+                mismatch.levels(runner, fit, recordings.frfs)
             if until == "diagnose":
                 outputs.report(runner)
             yield "diagnose"

@@ -165,13 +165,13 @@ def describe_levels(
     return Picture(
         name="levels",
         title="FRFs at low level (dashed) and at high level of excitation (solid)",
-        alt=f"Magnitude of {counted(len(levels.labels), 'FRF')} from the weaker and from the stronger half of the "
-        f"records, {number(low, 3)} to {number(high, 3)} N on average; they differ by "
-        f"{percent(float(difference), 2)}.",
+        alt=f"Magnitude of {counted(len(levels.labels), 'FRF')} at low and at high level of excitation, "
+        f"{number(low, 3)} to {number(high, 3)} N; they differ by {percent(float(difference), 2)}.",
         panels=(Panel(y=Axis(title=magnitude_title(levels.labels), scale="log"), layers=tuple(layers)),),
         x=frequency_axis(*(ends if band_hz is None else band_hz)),
-        note=f"Each half is averaged by itself; the two differ by {percent(float(difference), 2)} of their norm. Of a "
-        "linear structure the curves fall onto each other, but for noise.",
+        note="The weaker and the stronger half of the records, each averaged by itself; of FRFs that were given at "
+        f"several levels the lowest and the highest. The two differ by {percent(float(difference), 2)} of their norm. "
+        "Of a linear structure the curves fall onto each other, but for noise.",
         height_px=420,
     )
 
@@ -220,16 +220,17 @@ def describe_level_modes(levels: LevelDependence) -> Picture | None:
     return Picture(
         name="level-modes",
         title="Frequency and damping of each mode against the level of excitation, with 95 % bars",
-        alt=f"Change of frequency and damping ratio of {counted(len(groups), 'mode')} over the peak force of "
-        f"single records, {number(low, 3)} to {number(high, 3)} N.",
+        alt=f"Change of frequency and damping ratio of {counted(len(groups), 'mode')} over the level of excitation, "
+        f"{number(low, 3)} to {number(high, 3)} N.",
         panels=(
             Panel(y=Axis(title="Change of frequency, %"), layers=tuple(change for change, _ in curves)),
             Panel(y=Axis(title="Damping ratio, %", scale="log"), layers=tuple(damping for _, damping in curves)),
         ),
-        x=Axis(title="Peak force, N", scale="log", limits=(0.9 * low, 1.1 * high)),
-        note="From the FRF of each single record, in the sensor that shows the mode best; the change is that from the "
-        "strongest record. A line that leaves the level by more than its bars is a mode that is not linear. "
-        "A mode that a single record shows on a few lines only, or not by itself, is left out.",
+        x=Axis(title="Level of excitation, N", scale="log", limits=(0.9 * low, 1.1 * high)),
+        note="From the FRF of each single record (the level is its peak force), or of each level given, in the "
+        "sensor that shows the mode best; the change is that from the strongest. A line that leaves the level by more "
+        "than its bars is a mode that is not linear. A mode that is seen on a few lines only, or not by itself, is "
+        "left out.",
         height_px=460,
     )
 

@@ -2,7 +2,8 @@
 
 Each FRF is estimated once more from the weaker and from the stronger half of the records of an excited point. Around
 each mode, the FRF of every single record gives a frequency and a damping ratio (`fit_local_pole`).
-Records of a shaker are cut into segments as long as those of the FRFs.
+Records of a shaker are cut into segments as long as those of the FRFs. FRFs that were estimated elsewhere at several
+levels are compared as they are, lowest with highest.
 """
 
 from __future__ import annotations
@@ -21,14 +22,16 @@ from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.signals.transients import transform_subrecords
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord
+    from frf_ipz.frf import FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
 
 MIN_LEVEL_RATIO = 1.5  # of the strongest to the weakest record of a group: below, there is one level only
 MIN_RECORDS = 2
 MIN_LINES = 8
+FARTHEST_PEAK = 10.0  # half-widths of a mode from one level to the next: farther peaks are other modes
 DOMINANT = 0.5  # of an FRF at its peak: the part of it that a mode needs to be fitted by itself
 COLUMNS = (
     "mode",
@@ -106,6 +109,76 @@ def compare_levels(observations: Observations, fit: ModalFit) -> LevelDependence
         curves += _compare_halves(group, spectra)
         rows += _fit_modes(group, spectra, s, fit)
     return _as_level_dependence(frequency[used], curves, rows)
+
+
+def compare_frf_levels(at_levels: Mapping[float, FrfSet], fit: ModalFit) -> LevelDependence:
+    """Compare FRFs that were estimated elsewhere at several levels, FRF by FRF and mode by mode.
+
+    Parameters
+    ----------
+    at_levels : mapping of float to FrfSet
+        Amplitude of the excitation, N, in ascending order, and the FRFs measured with it.
+    fit : ModalFit
+        Its modes are followed.
+
+    Returns
+    -------
+    LevelDependence
+        Without FRFs where none was measured at several levels; its ``record`` is the level as a text.
+    """
+    levels = list(at_levels)
+    frequency = _shared_lines([frfs.frequency_hz for frfs in at_levels.values()])
+    curves = []
+    for label in dict.fromkeys(label for frfs in at_levels.values() for label in frfs.labels):
+        own = [level for level in levels if label in at_levels[level].labels]
+        if len(own) > 1:
+            weak, strong = (np.abs(_values_at(at_levels[level], label, frequency)) for level in (own[0], own[-1]))
+            curves.append(_Curve(label, weak, strong, own[0], own[-1]))
+    labels = [curve.label for curve in curves]
+    rows: list[tuple[object, ...]] = []
+    for mode, pole in enumerate(fit.model.poles[: fit.n_modes]):
+        clearest = _find_clearest_sensor(labels, fit, mode)
+        if clearest is not None:
+            rows += _follow_pole(at_levels, labels[clearest], mode, complex(pole))
+    return _as_level_dependence(frequency, curves, rows)
+
+
+def _follow_pole(
+    at_levels: Mapping[float, FrfSet], label: FrfLabel, mode: int, pole: complex
+) -> list[tuple[object, ...]]:
+    """Follow a mode upwards, each level from the peak that is nearest to where the level below has it."""
+    rows: list[tuple[object, ...]] = []
+    for level, frfs in at_levels.items():
+        if label not in frfs.labels:
+            continue
+        s = np.asarray(frfs.window_decay_1_s + 2j * np.pi * frfs.frequency_hz, np.complex128)
+        values = frfs.values[:, frfs.labels.index(label)]
+        near = np.flatnonzero(np.abs(s.imag - pole.imag) <= FARTHEST_PEAK * (s[0].real - pole.real))
+        if not len(near):
+            continue
+        start = complex(pole.real, s.imag[near[np.argmax(np.abs(values[near]))]])
+        nearest = lines_around_pole(s, start)
+        if len(nearest) < MIN_LINES:
+            continue
+        local = fit_local_pole(s[nearest], values[nearest], start)
+        if local is not None:
+            pole = local.pole
+            rows.append((mode, str(label), f"{level:g} N", level, *_frequency_and_damping(local)))
+    return rows
+
+
+def _shared_lines(grids: Sequence[FloatArray]) -> FloatArray:
+    """Give the lines of the coarsest grid that all grids reach."""
+    if not grids:
+        return np.zeros(0)
+    low, high = max(grid[0] for grid in grids), min(grid[-1] for grid in grids)
+    inside = [grid[(grid >= low) & (grid <= high)] for grid in grids]
+    return min(inside, key=len)
+
+
+def _values_at(frfs: FrfSet, label: FrfLabel, frequency_hz: FloatArray) -> ComplexArray:
+    """Interpolate an FRF to lines that it may lack."""
+    return np.asarray(np.interp(frequency_hz, frfs.frequency_hz, frfs.values[:, frfs.labels.index(label)]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.frf_estimate import FrfEstimate
 from frf_ipz.ingest.signals.windows import correlated_lines
 from frf_ipz.ingest.units import frf_factor
+from frf_ipz.progress import silent
 from frf_ipz.quantities import FrfQuantity, as_quantity
 
 if TYPE_CHECKING:
@@ -64,15 +65,61 @@ def estimate_frf_files(test: VibrationTest, options: IngestOptions, progress: Pr
     if test.frfs is not None:
         places = [test.frfs.labels.index(label) for label in test.labels]
         return FrfEstimate(frfs=test.frfs.select_frfs(places), records=empty_record_table())
-    frfs: list[MeasuredFrf] = []
+    at_levels = _read_by_level(test, progress)
+    weakest: dict[FrfLabel, MeasuredFrf] = {}
+    for frfs in at_levels.values():
+        for frf in frfs:
+            weakest.setdefault(frf.label, frf)
+    joined, warnings = _as_measured(test, list(weakest.values()))
+    return FrfEstimate(
+        frfs=joined, records=empty_record_table(), warnings=(*warnings, *_say_levels(sorted(at_levels.keys() - {0.0})))
+    )
+
+
+def read_frf_levels(test: VibrationTest) -> dict[float, FrfSet]:
+    """Read the FRFs of each level of excitation that ``level`` of ``[[frf]]`` states.
+
+    Parameters
+    ----------
+    test : VibrationTest
+        A test of kind ``frf``.
+
+    Returns
+    -------
+    dict of float to FrfSet
+        Amplitude of the excitation, N, in ascending order, and its FRFs in SI. Empty where fewer than two are stated.
+    """
+    at_levels = {level: frfs for level, frfs in _read_by_level(test).items() if level}
+    return {level: _as_measured(test, frfs)[0] for level, frfs in at_levels.items()} if len(at_levels) > 1 else {}
+
+
+def _read_by_level(test: VibrationTest, progress: Progress = silent) -> dict[float, list[MeasuredFrf]]:
+    """Read all FRFs by ascending level; 0 for those that state none."""
+    frfs: dict[float, list[MeasuredFrf]] = {}
     for position, source in enumerate(test.frf_sources):
         progress(position / len(test.frf_sources), f"reading {source.path.name}")
-        frfs += [_to_si(frf) for frf in read_frf_source(source) if frf.label in test.labels]
+        of_level = frfs.setdefault(source.level_N or 0.0, [])
+        of_level += [_to_si(frf) for frf in read_frf_source(source) if frf.label in test.labels]
+    for level, of_level in frfs.items():
+        _check_frfs(of_level, others=frfs.get(0.0, ()) if level else ())
+    return dict(sorted(frfs.items()))
+
+
+def _as_measured(test: VibrationTest, frfs: Sequence[MeasuredFrf]) -> tuple[FrfSet, tuple[str, ...]]:
     joined, warnings = _join(frfs)
     joined = replace(joined, unknown_scale=test.unknown_scale)
     if test.applied_window_s is not None:
         joined = _with_applied_window(joined, 1.0 / test.applied_window_s)
-    return FrfEstimate(frfs=joined, records=empty_record_table(), warnings=warnings)
+    return joined, warnings
+
+
+def _say_levels(levels_N: Sequence[float]) -> tuple[str, ...]:
+    if len(levels_N) < 2:
+        return ()
+    return (
+        f"FRFs at {len(levels_N)} levels, {levels_N[0]:g} to {levels_N[-1]:g} N: each FRF of the fit is the one at its "
+        "lowest level; picture 'levels' shows how modes move with it",
+    )
 
 
 def _with_applied_window(frfs: FrfSet, decay_1_s: float) -> FrfSet:
@@ -155,7 +202,9 @@ def read_frfs(
         direction=as_direction(direction),
         is_conjugated=conjugated,
     )
-    return _join([_to_si(frf) for frf in read_frf_source(source)])[0]
+    frfs = [_to_si(frf) for frf in read_frf_source(source)]
+    _check_frfs(frfs)
+    return _join(frfs)[0]
 
 
 def _as_dofs(dofs: Dof | str | Sequence[Dof | str] | None) -> tuple[Dof, ...]:
@@ -167,7 +216,6 @@ def _as_dofs(dofs: Dof | str | Sequence[Dof | str] | None) -> tuple[Dof, ...]:
 def _join(frfs: Sequence[MeasuredFrf]) -> tuple[FrfSet, tuple[str, ...]]:
     """Bring FRFs to the lines that all of them have; with what is to be said about it."""
     labels = tuple(frf.label for frf in frfs)
-    _check_frfs(frfs, labels)
     lines, warnings = _common_lines(frfs)
     pairs = [(frf, _nearest(frf.frequency_hz, lines)) for frf in frfs]
     joined = FrfSet(
@@ -198,12 +246,14 @@ def _to_si(frf: MeasuredFrf) -> MeasuredFrf:
     return replace(frf, values=frf.values * factor, variance=variance)
 
 
-def _check_frfs(frfs: Sequence[MeasuredFrf], labels: Sequence[FrfLabel]) -> None:
-    first: dict[FrfLabel, MeasuredFrf] = {}
-    for frf, label in zip(frfs, labels, strict=True):
-        path, frequency = frf.source.path, frf.frequency_hz
+def _check_frfs(frfs: Sequence[MeasuredFrf], others: Sequence[MeasuredFrf] = ()) -> None:
+    """Check FRFs of one level; `others` state none."""
+    first = {frf.label: frf for frf in others}
+    for frf in frfs:
+        path, frequency, label = frf.source.path, frf.frequency_hz, frf.label
         if label in first:
-            raise FileFormatError(path, f"holds the FRF {label} that {first[label].source.path.name} holds already")
+            problem = f"holds the FRF {label} that {first[label].source.path.name} holds already"
+            raise FileFormatError(path, f"{problem}; FRFs at several levels of excitation need 'level' in each [[frf]]")
         first[label] = frf
         if len(frequency) < 2 or (np.diff(frequency) <= 0.0).any() or frequency[0] < 0.0:
             problem = f"the frequencies of the FRF {label} do not ascend from 0 or above, each once"

@@ -11,9 +11,10 @@ from frf_ipz.diagnosis.apply import correct_frfs, correct_model
 from frf_ipz.diagnosis.deadline import Deadline
 from frf_ipz.diagnosis.diagnose import find_causes
 from frf_ipz.diagnosis.effect_selection import EffectCatalogue
-from frf_ipz.diagnosis.measured.levels import compare_levels
+from frf_ipz.diagnosis.measured.levels import compare_frf_levels, compare_levels
 from frf_ipz.diagnosis.observations import observe
 from frf_ipz.frf import FrfSet
+from frf_ipz.ingest.estimation.frf_files import read_frf_levels
 from frf_ipz.input_files import entering
 from frf_ipz.output_files import write_text
 
@@ -148,12 +149,14 @@ def levels(runner: StageRunner, fit: ModalFit, frfs: FrfSet) -> LevelDependence:
     LevelDependence
         Empty where there is one level only.
     """
-    options = runner.inputs.options
-    return runner.stage(
-        "levels",
-        {"after": runner.after("ingest", "fit")},
-        lambda _: compare_levels(observe(runner.inputs.test, ingest=options.ingest, frfs=frfs, fit=options.fit), fit),
-    )
+    options, test = runner.inputs.options, runner.inputs.test
+
+    def compare(_: Progress) -> LevelDependence:
+        if test.kind == "frf":
+            return compare_frf_levels(read_frf_levels(test), fit)
+        return compare_levels(observe(test, ingest=options.ingest, frfs=frfs, fit=options.fit), fit)
+
+    return runner.stage("levels", {"after": runner.after("ingest", "fit")}, compare)
 
 
 def apply_diagnosis(
