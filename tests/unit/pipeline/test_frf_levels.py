@@ -45,6 +45,7 @@ def test_the_weakest_is_fitted_and_the_others_show_which_mode_moves(tmp_path):
         assert rows["level_N"].tolist() == list(LEVELS)
         assert rows["frequency_hz"].to_numpy() == pytest.approx([hertz[place] for hertz in LEVELS.values()], rel=1e-4)
         assert rows["damping_ratio"].to_numpy() == pytest.approx(RATIO, rel=0.02)
+    assert 'id="level-modes"' in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert results.level_dependence.weak_N.tolist() == [0.1]
     assert results.level_dependence.strong_N.tolist() == [1.0]
 

@@ -41,7 +41,11 @@ def build(run: Results) -> Section | None:
         anchor="fit",
         title="Fit",
         lead=lead,
-        blocks=(*run_figures(run, "fit"), *([_table(fit.misfit)] if len(fit.misfit) else [])),
+        blocks=(
+            *run_figures(run, "fit"),
+            *([_table(fit.misfit)] if len(fit.misfit) else []),
+            *(run_figures(run, "levels") if run.diagnosis is None else ()),  # else that section has them
+        ),
     )
 
 
