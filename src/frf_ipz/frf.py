@@ -81,6 +81,10 @@ class Measured(Protocol):
         """What each FRF connects."""
 
     @property
+    def connections(self) -> tuple[FrfLabel, ...]:
+        """What a model's FRFs connect: sensors and forces, whether or not FRFs were measured between them."""
+
+    @property
     def frequency_hz(self) -> FloatArray:
         """Frequency lines, (n_lines,) array, Hz."""
 
@@ -277,6 +281,11 @@ class FrfSet(Tabulated, Drawn):
             averages=np.full(len(labels), averages, np.int64),
             unknown_scale=unknown_scale,
         )
+
+    @property
+    def connections(self) -> tuple[FrfLabel, ...]:
+        """The same as `labels`: what a model's FRFs connect."""
+        return self.labels
 
     @property
     def n_lines(self) -> int:

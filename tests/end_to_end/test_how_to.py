@@ -10,7 +10,9 @@ from page_blocks import assert_same, run_page
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 
 
-@pytest.mark.parametrize(("name", "count"), [("arrays", 4), ("own_effect", 1), ("fleets", 2), ("extend", 2)])
+@pytest.mark.parametrize(
+    ("name", "count"), [("arrays", 4), ("own_effect", 1), ("fleets", 2), ("extend", 2), ("modes_only", 1)]
+)
 def test_page(name, count, tmp_path):
     with contextlib.chdir(tmp_path):
         texts = run_page((HOW_TO / f"{name}.md").read_text(encoding="utf-8"))

@@ -13,7 +13,7 @@ from frf_ipz.assessment.causes.cause import Situation
 from frf_ipz.assessment.causes.columns import find_exchanged_columns, find_inverted_columns
 from frf_ipz.assessment.causes.likely_cause import find_likely_cause
 from frf_ipz.assessment.causes.modal_comparison import computed_modes, measured_modes
-from frf_ipz.assessment.checks import agreement, counterparts, prediction, quality
+from frf_ipz.assessment.checks import agreement, counterparts, prediction, quality, shapes
 from frf_ipz.errors import NumericalError
 from frf_ipz.fe.eigen import solve_modes
 
@@ -42,6 +42,16 @@ CHECKS: tuple[Ask, ...] = (
     quality.scale,
     quality.diagnosis,
 )
+WITHOUT_FRFS: tuple[Ask, ...] = (
+    quality.targets,
+    shapes.no_frfs,
+    shapes.agreement,
+    counterparts.modes,
+    prediction.reference,
+    prediction.band_width,
+    quality.parameters,
+    quality.diagnosis,
+)
 MODES_BEYOND = 12  # of the model, besides twice the measured ones: a model that is too soft has more in the band
 
 
@@ -58,7 +68,8 @@ def assess(evidence: Evidence) -> Assessment:
     Assessment
         Verdict, checks and likely cause.
     """
-    checks = [check for ask in CHECKS for check in ask(evidence)]
+    asked = CHECKS if evidence.frfs.n_frfs else WITHOUT_FRFS
+    checks = [check for ask in asked for check in ask(evidence)]
     cause = likely_cause(
         evidence.frfs,
         evidence.fit,
@@ -102,8 +113,10 @@ def likely_cause(
     Returns
     -------
     LikelyCause or None
-        None where no mistake is more likely than not.
+        None where no mistake is more likely than not, and where there are no FRFs.
     """
+    if not frfs.n_frfs:
+        return None
     exchanged = find_exchanged_columns(impacts, frfs.labels, test_file=test_file)
     if exchanged is not None:
         return exchanged

@@ -72,7 +72,7 @@ class Evidence(MeasuredPoints):
     @cached_property
     def deviation(self) -> FrfDeviation | None:
         """How far the models are from the measured FRFs; None where nothing stands above the noise."""
-        return measured_deviation(self)
+        return measured_deviation(self) if self.frfs.n_frfs else None
 
     @cached_property
     def point_deviation(self) -> FrfDeviation | None:

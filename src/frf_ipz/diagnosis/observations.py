@@ -12,6 +12,7 @@ from frf_ipz.arguments import require_type
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, read_only, require_shape
 from frf_ipz.display import Concise
 from frf_ipz.dofs import Dof
+from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfSet
 from frf_ipz.identification.measured_lines import measured_lines
 from frf_ipz.identification.options import FitOptions
@@ -24,6 +25,11 @@ if TYPE_CHECKING:
     from frf_ipz.ingest import records as recorded
 
 BLOCK = 128  # samples
+WITHOUT_FRFS = (
+    "a diagnosis compares FRFs, and a test of kind 'modes' has none: masses, springs and joints that are missing, what "
+    "depends on the level, gains and delays of sensors cannot be told from modes; 'run' says which modes have no "
+    "counterpart in the model; measure FRFs, or take [diagnose] apply out"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -271,7 +277,7 @@ def observe(
     Raises
     ------
     InputError
-        If a recording cannot be used, or too few lines are left in the band.
+        If a recording cannot be used, too few lines are left in the band, or the test has modes and no FRFs.
 
     Examples
     --------
@@ -298,6 +304,8 @@ def observe(
     require_type("frfs", frfs, FrfSet)
     require_type("ingest", ingest, IngestOptions, optional=True)
     require_type("fit", fit, FitOptions, optional=True)
+    if test.modes is not None:
+        raise InputError(WITHOUT_FRFS)
     chosen = fit or FitOptions()
     band = measured_lines(frfs, chosen).band_hz
     records: tuple[ObservedRecord, ...] = ()

@@ -440,4 +440,4 @@ def _scale_notes(scale: MeasuredScale) -> tuple[str, ...]:
 def _ports(
     measured: Measured, points: Sequence[Dof | str], options: ExportOptions, delays_s: Mapping[str, float] | None
 ) -> Ports:
-    return choose_ports(measured.labels, list(as_dofs(points)), options, delays_s or {})
+    return choose_ports(measured.connections, list(as_dofs(points)), options, delays_s or {})

@@ -149,7 +149,7 @@ def estimate_uncertainty_weights(
     """
     require_measured(measured)
     require_type("updated_model", updated_model, UpdatedModel)
-    labels, updated = measured.labels, updated_model
+    labels, updated = measured.connections, updated_model
     if frequency_hz is None:
         low, high = measured.band_hz
         frequency_hz = np.geomspace(max(low, high / WIDEST), high, WEIGHT_LINES)

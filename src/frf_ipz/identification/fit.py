@@ -41,19 +41,24 @@ from frf_ipz.identification.search.find_modes import (
 )
 from frf_ipz.identification.search.goodness_of_fit import assess_fit
 from frf_ipz.identification.search.split_half import SplitHalf, fit_halves, unconfirmed_reasons
+from frf_ipz.identification.stated_modes import take_stated_modes
+from frf_ipz.modes import ModalParameters
 from frf_ipz.progress import Progress, silent
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 NOISE_ROUNDS = 3  # of fitting residues and estimating the noise in turn
 
 
-def fit_modes(frfs: FrfSet, *, options: FitOptions | None = None, progress: Progress = silent) -> ModalFit:
+def fit_modes(
+    frfs: FrfSet | ModalParameters, *, options: FitOptions | None = None, progress: Progress = silent
+) -> ModalFit:
     """Fit poles, residues and zeros to measured FRFs.
 
     Parameters
     ----------
-    frfs : FrfSet
-        Measured FRFs; with their variance where it is known.
+    frfs : FrfSet or ModalParameters
+        Measured FRFs; with their variance where it is known. Modes that were identified elsewhere are taken as they
+        are.
     options : FitOptions, optional
         Band, pinned and rejected poles, kind of modes.
     progress : Progress
@@ -82,9 +87,11 @@ def fit_modes(frfs: FrfSet, *, options: FitOptions | None = None, progress: Prog
        frequency_hz  damping_ratio
     0        80.004           0.01
     """
-    require_type("frfs", frfs, FrfSet)
+    require_type("frfs", frfs, FrfSet, ModalParameters)
     require_type("options", options, FitOptions, optional=True)
     chosen = options or FitOptions()
+    if isinstance(frfs, ModalParameters):
+        return take_stated_modes(frfs, chosen)
     fitted = find_modes(frfs, chosen, progress=progress)
     halves = None
     if fitted.noise_from == "misfit":

@@ -12,6 +12,7 @@ from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.errors import ShapeError
 from frf_ipz.frf import FrfLabel
 from frf_ipz.identification.root_covariance import RootCovariance
+from frf_ipz.modes import ModalParameters
 from frf_ipz.rational import PoleResidueModel, ZeroSet, natural_frequency_hz
 
 MODES_SHOWN = 6
@@ -60,11 +61,14 @@ class ModalFit(Tabulated, Drawn):
     channel_gains : DataFrame
         One row a channel whose gain was estimated: ``channel, gain, gain_std``.
     noise_from : str
-        ``recordings`` or ``misfit``: where the covariance's sigma comes from.
+        ``recordings`` or ``misfit``: where the covariance's sigma comes from; ``stated`` for modes that were identified
+        elsewhere.
     warnings : tuple of str
         What the user has to know.
     unknown_scale : str
         ``none``, ``common`` or ``per_channel``, as the FRFs say: gains that are fitted once there is a model.
+    modes_given : ModalParameters, optional
+        Modes that were identified elsewhere: the fit of a test without FRFs has them in the place of residues.
 
     Examples
     --------
@@ -109,10 +113,18 @@ class ModalFit(Tabulated, Drawn):
     noise_from: str
     warnings: tuple[str, ...] = ()
     unknown_scale: str = "none"
+    modes_given: ModalParameters | None = None
+
+    @property
+    def connections(self) -> tuple[FrfLabel, ...]:
+        """What a model's FRFs connect: `labels`, or sensors and forces of modes that were identified elsewhere."""
+        return self.labels if self.modes_given is None else self.modes_given.labels
 
     def __repr__(self) -> str:
         values = [f"{hertz:.2f}" for hertz in natural_frequency_hz(self.model.poles[: self.n_modes])]
         listed = ", ".join(values[:MODES_SHOWN]) + (", ..." if len(values) > MODES_SHOWN else "")
+        if self.modes_given is not None:
+            return f"ModalFit: {self.n_modes} modes at {listed} Hz, identified elsewhere"
         zeros = f"{np.count_nonzero(self.zeros.identifiable)} zeros of {len(self.labels)} FRFs"
         return f"ModalFit: {self.n_modes} modes at {listed} Hz, {zeros}" if values else f"ModalFit: no modes, {zeros}"
 

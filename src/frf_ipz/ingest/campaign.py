@@ -23,6 +23,7 @@ from frf_ipz.frf import SCALES, FrfLabel, FrfSet
 from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.formats.recording import TableKeys
 from frf_ipz.ingest.units import numerator_of
+from frf_ipz.modes import ModalParameters
 from frf_ipz.quantities import RESPONSES, frf_quantity_of
 
 if TYPE_CHECKING:
@@ -253,7 +254,7 @@ class VibrationTest(Concise):
     name : str
         What the user calls it.
     kind : str
-        ``hammer``, ``random`` or ``frf``.
+        ``hammer``, ``random``, ``frf`` or ``modes``.
     nominal_damping_ratio : float, optional
         For models that state no damping.
     unknown_scale : str
@@ -274,6 +275,11 @@ class VibrationTest(Concise):
         Recordings that are in memory: time in s, force, responses, SI. They are not read from a file.
     frfs : FrfSet, optional
         FRFs that are in memory.
+    modes_path : Path, optional
+        File of the modes, of kind ``modes``.
+    modes : ModalParameters, optional
+        Modes that were identified elsewhere, of kind ``modes``; `labels` then name what a model predicts between their
+        DOFs, and no FRF was measured.
     particulars : mapping of str to str
         Who measured, when, with what, for whom, and which machine: ``operator``, ``date``, ``equipment``,
         ``customer``, ``serial_number``, as far as they are stated.
@@ -311,6 +317,8 @@ class VibrationTest(Concise):
     applied_window_s: float | None = None
     signals: Mapping[Path, FloatArray] = field(default_factory=dict, repr=False)
     frfs: FrfSet | None = field(default=None, repr=False)
+    modes_path: Path | None = None
+    modes: ModalParameters | None = field(default=None, repr=False)
     particulars: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -457,6 +465,68 @@ class VibrationTest(Concise):
             frfs=frfs,
         )
 
+    @classmethod
+    def from_modes(
+        cls, modes: ModalParameters, *, name: str = "test", nominal_damping_ratio: float | None = None
+    ) -> VibrationTest:
+        """Make a test from modes in memory.
+
+        Parameters
+        ----------
+        modes : ModalParameters
+            The modes.
+        name : str
+            What the test is called.
+        nominal_damping_ratio : float, optional
+            For models that state no damping.
+
+        Returns
+        -------
+        VibrationTest
+            Of kind ``modes``.
+
+        Examples
+        --------
+        >>> import frf_ipz
+        >>> modes = frf_ipz.ModalParameters(
+        ...     natural_frequency_hz=[12.5], damping_ratio=[0.02], shapes=[[0.4], [1.0]], dofs=["6:+z", "11:+z"],
+        ...     input_dofs=["11:+z"],
+        ... )
+        >>> frf_ipz.VibrationTest.from_modes(modes).kind
+        'modes'
+        """
+        require_type("modes", modes, ModalParameters)
+        return cls(
+            path=Path(name),
+            name=name,
+            kind="modes",
+            nominal_damping_ratio=nominal_damping_ratio,
+            unknown_scale="none",
+            channels=(),
+            setups=(),
+            frf_sources=(),
+            labels=modes.labels,
+            modes=modes,
+        )
+
+    def with_forces_at(self, points: Sequence[Dof]) -> VibrationTest:
+        """Let forces of a test of modes that names none act at the points of interest; without any, at its first DOF.
+
+        Parameters
+        ----------
+        points : sequence of Dof
+            Points of interest.
+
+        Returns
+        -------
+        VibrationTest
+            The same for any other test.
+        """
+        if self.modes is None or self.modes.input_dofs:
+            return self
+        modes = replace(self.modes, input_dofs=tuple(points) or self.modes.dofs[:1])
+        return replace(self, modes=modes, labels=modes.labels)
+
     @property
     def input_channel(self) -> Channel:
         """The force."""
@@ -470,7 +540,7 @@ class VibrationTest(Concise):
     @property
     def output_dofs(self) -> tuple[Dof, ...]:
         """Where sensors sit in any of the FRFs, each once."""
-        return tuple(dict.fromkeys(label.output_dof for label in self.labels))
+        return tuple(dict.fromkeys([*(self.modes.dofs if self.modes else ()), *(x.output_dof for x in self.labels)]))
 
     @property
     def input_dofs(self) -> tuple[Dof, ...]:
@@ -491,7 +561,8 @@ class VibrationTest(Concise):
     def files(self) -> tuple[Path, ...]:
         """All files of measurements, each once."""
         recordings = [path for _, path in self.recordings if path not in self.signals]
-        return tuple(dict.fromkeys([*recordings, *(source.path for source in self.frf_sources)]))
+        modes = [] if self.modes_path is None else [self.modes_path]
+        return tuple(dict.fromkeys([*recordings, *(source.path for source in self.frf_sources), *modes]))
 
     @cached_property
     def sensor_masses(self) -> dict[int, float]:

@@ -21,8 +21,9 @@ from frf_ipz.ingest.campaign import (
     setup_labels,
 )
 from frf_ipz.ingest.formats.frf_file import FrfSource, frf_label
+from frf_ipz.ingest.formats.modes_file import ModesSource
 from frf_ipz.ingest.formats.recording import TableKeys
-from frf_ipz.ingest.formats.registry import read_frf_file
+from frf_ipz.ingest.formats.registry import read_frf_file, read_modes_file
 from frf_ipz.ingest.units import sensitivity_factor, unit_factor
 from frf_ipz.option_types import Count, CountOrNone, Day, NotNegative, Positive, Ratio
 from frf_ipz.quantities import FrfQuantity
@@ -31,7 +32,9 @@ from frf_ipz.toml_files import STRICT, read_toml
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-ENTRY_OF_KIND = {"hammer": "hit", "random": "record", "frf": "frf"}
+ENTRY_OF_KIND = {"hammer": "hit", "random": "record", "frf": "frf", "modes": "modes"}
+
+WITHOUT_CHANNELS = {"frf": "FRFs say themselves what they connect", "modes": "modes name their DOFs themselves"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +46,7 @@ class TestKeys:
     name : str
         What the user calls it.
     kind : str
-        Impacts of a hammer, long records of a shaker, or FRFs that were estimated elsewhere.
+        Impacts of a hammer, long records of a shaker, FRFs that were estimated elsewhere, or modes without any FRF.
     nominal_damping_ratio : float, optional
         Damping ratio of all modes, for models that state no damping.
     unknown_scale : str
@@ -71,7 +74,7 @@ class TestKeys:
 
     __pydantic_config__ = STRICT
 
-    kind: Literal["hammer", "random", "frf"]
+    kind: Literal["hammer", "random", "frf", "modes"]
     name: str = ""
     nominal_damping_ratio: Ratio | None = None
     unknown_scale: Literal["none", "common", "per_channel"] = "none"
@@ -195,6 +198,29 @@ class FrfKeys:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ModesKeys:
+    """``[[modes]]``: a file of modes that were identified elsewhere.
+
+    Parameters
+    ----------
+    file : str
+        Universal file with data sets 55; or CSV
+        ``mode,frequency_hz,damping_ratio[,frequency_std_hz,damping_ratio_std],dof,real,imag`` with one row a mode and
+        DOF.
+    input_dofs : tuple of str
+        Where forces act in the FRFs that the model predicts; the points of interest where it is left out.
+    quantity : str
+        What these FRFs are.
+    """
+
+    __pydantic_config__ = STRICT
+
+    file: str
+    input_dofs: tuple[str, ...] = ()
+    quantity: Literal["receptance", "mobility", "accelerance"] = "accelerance"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CampaignFileKeys:
     """The whole file.
 
@@ -208,6 +234,8 @@ class CampaignFileKeys:
         ``[[hit]]`` of kind ``hammer``, ``[[record]]`` of kind ``random``.
     frf : tuple of FrfKeys
         ``[[frf]]`` of kind ``frf``.
+    modes : tuple of ModesKeys
+        ``[[modes]]`` of kind ``modes``: one.
     """
 
     __pydantic_config__ = STRICT
@@ -217,6 +245,7 @@ class CampaignFileKeys:
     hit: tuple[SetupKeys, ...] = ()
     record: tuple[SetupKeys, ...] = ()
     frf: tuple[FrfKeys, ...] = ()
+    modes: tuple[ModesKeys, ...] = ()
 
 
 def read_test(path: str | Path) -> VibrationTest:
@@ -274,6 +303,9 @@ def read_test(path: str | Path) -> VibrationTest:
     sources = tuple(_read_source(path, entry) for entry in keys.frf)
     labels = [label for setup in setups for label in setup_labels(channels, setup)]
     labels += [label for source in sources for label in _labels_of_source(source)]
+    modes_source = next((_read_modes_source(path, entry) for entry in keys.modes), None)
+    modes = None if modes_source is None else read_modes_file(modes_source)
+    labels += [] if modes is None else modes.labels
     return VibrationTest(
         path=path,
         name=keys.test.name or path.parent.name,
@@ -289,6 +321,8 @@ def read_test(path: str | Path) -> VibrationTest:
         channels=channels,
         setups=setups,
         frf_sources=sources,
+        modes_path=None if modes_source is None else modes_source.path,
+        modes=modes,
         particulars={name: text for name in PARTICULARS if (text := getattr(keys.test, name).strip())},
         labels=tuple(dict.fromkeys(labels)),
     )
@@ -312,13 +346,16 @@ def _check_sections(path: Path, keys: CampaignFileKeys) -> None:
         raise FileFormatError(path, problem, where="key 'test.applied_exponential_window_s'")
     if not present:
         raise FileFormatError(path, f"a test of kind '{kind}' needs at least one [[{entry}]]")
-    if kind == "frf" and keys.channel:
-        problem = "a test of kind 'frf' has no channels: its FRFs say themselves what they connect"
+    if kind in WITHOUT_CHANNELS and keys.channel:
+        problem = f"a test of kind '{kind}' has no channels: its {WITHOUT_CHANNELS[kind]}"
         raise FileFormatError(path, problem, where="key 'channel'")
+    if len(keys.modes) > 1:
+        problem = f"has {len(keys.modes)} [[modes]]; put all modes into one file, each with a row for each DOF"
+        raise FileFormatError(path, problem, where="key 'modes'")
 
 
 def _read_channels(path: Path, keys: CampaignFileKeys) -> tuple[Channel, ...]:
-    if keys.test.kind == "frf":
+    if keys.test.kind in WITHOUT_CHANNELS:
         return ()
     channels = [_read_channel(path, entry) for entry in keys.channel]
     for column, count in Counter(channel.column for channel in channels).items():
@@ -442,6 +479,15 @@ def _read_source(path: Path, keys: FrfKeys) -> FrfSource:
         sets=keys.sets,
         is_conjugated=keys.conjugated,
         level_N=keys.level,
+    )
+
+
+def _read_modes_source(path: Path, keys: ModesKeys) -> ModesSource:
+    where = f"[[modes]] '{keys.file}'"
+    return ModesSource(
+        path=path.parent / keys.file,
+        input_dofs=tuple(_parse_dof(path, text, where) for text in keys.input_dofs),
+        quantity=FrfQuantity(keys.quantity),
     )
 
 

@@ -8,6 +8,7 @@ from frf_ipz.arguments import require_type
 from frf_ipz.ingest.campaign import VibrationTest
 from frf_ipz.ingest.estimation.frf_files import estimate_frf_files
 from frf_ipz.ingest.estimation.hammer import estimate_hammer
+from frf_ipz.ingest.estimation.modes import hand_on_modes
 from frf_ipz.ingest.estimation.random import estimate_random
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.progress import Progress, silent
@@ -15,7 +16,7 @@ from frf_ipz.progress import Progress, silent
 if TYPE_CHECKING:
     from frf_ipz.ingest.frf_estimate import FrfEstimate
 
-KINDS = {"hammer": estimate_hammer, "random": estimate_random, "frf": estimate_frf_files}
+KINDS = {"hammer": estimate_hammer, "random": estimate_random, "frf": estimate_frf_files, "modes": hand_on_modes}
 
 
 def estimate_frfs(

@@ -9,6 +9,7 @@ import pandas as pd
 from frf_ipz.arrays import FloatArray
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.frf import FrfSet
+from frf_ipz.modes import ModalParameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,6 +56,8 @@ class FrfEstimate(Tabulated, Drawn):
         What was chosen, and by what: windows, segments, lines.
     warnings : tuple of str
         Whatever the user has to know.
+    modes : ModalParameters, optional
+        Modes of a test that has no FRFs; `frfs` is then empty, and has the lines on which a model is evaluated.
 
     Examples
     --------
@@ -82,8 +85,11 @@ class FrfEstimate(Tabulated, Drawn):
     traces: tuple[Trace, ...] = ()
     choices: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    modes: ModalParameters | None = None
 
     def __repr__(self) -> str:
+        if self.modes is not None:
+            return f"FrfEstimate: no FRF; {len(self.modes.damping_ratio)} modes at {len(self.modes.dofs)} DOFs"
         used = int(self.records["used"].sum()) if len(self.records) else 0
         of_records = f"{used} of {len(self.records)} records" if len(self.records) else "FRFs estimated elsewhere"
         return f"FrfEstimate: {of_records}; {self.frfs!r}"

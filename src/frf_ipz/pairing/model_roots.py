@@ -11,6 +11,7 @@ from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros
 
 if TYPE_CHECKING:
+    from frf_ipz.dofs import Dof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.structure import ReducedModel
 
@@ -29,7 +30,8 @@ class ModelPoles:
     values : (n,) complex array
         By ascending modulus, one a conjugate pair, rad/s.
     amplitudes : (n, n_frfs) complex array
-        Mass-normalised product of the shape at sensor and excitation: the receptance's residue times ``2 i |p|``, 1/kg.
+        Mass-normalised product of the shape at sensor and excitation: the receptance's residue times ``2 i |p|``, 1/kg;
+        without FRFs the mass-normalised shape at each DOF, 1/sqrt(kg).
     """
 
     values: ComplexArray
@@ -79,6 +81,28 @@ def model_poles(model: ReducedModel, labels: tuple[FrfLabel, ...]) -> ModelPoles
     is_simple = np.abs(roots.slope) > RIGID * np.abs(roots.slope).max(initial=0.0)
     residues = np.where(is_simple, products / np.where(is_simple, roots.slope, 1.0), 0.0)
     return ModelPoles(values=roots.values, amplitudes=(residues * 2j * np.abs(roots.values)).T)
+
+
+def model_shapes(model: ReducedModel, dofs: tuple[Dof, ...]) -> ModelPoles:
+    """Compute the poles of a model with their shapes at some DOFs.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model.
+    dofs : tuple of Dof
+        Where modes were measured; their signs do not count.
+
+    Returns
+    -------
+    ModelPoles
+        Its amplitudes are the shapes.
+    """
+    roots = damped_poles(model.mass, model.damping, model.stiffness)
+    roots = roots.take(_one_of_each_pair(roots.values))
+    shapes = np.array([model.row(dof.unsigned) for dof in dofs]) @ roots.right_vectors
+    modal_mass = np.sqrt(np.abs(np.einsum("ik,ij,jk->k", roots.right_vectors.conj(), model.mass, roots.right_vectors)))
+    return ModelPoles(values=roots.values, amplitudes=(shapes / modal_mass).T)
 
 
 def model_zeros(model: ReducedModel, label: FrfLabel) -> ModelZeros:

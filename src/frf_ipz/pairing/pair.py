@@ -11,7 +11,7 @@ import numpy as np
 
 from frf_ipz.arguments import require_type
 from frf_ipz.identification.modal_fit import ModalFit
-from frf_ipz.pairing.model_roots import ModelPoles, ModelZeros, model_poles, model_zeros
+from frf_ipz.pairing.model_roots import ModelPoles, ModelZeros, model_poles, model_shapes, model_zeros
 from frf_ipz.pairing.pairs import Pair, Pairs, PairVerdict
 from frf_ipz.pairing.poles import PolePairing, pair_poles
 from frf_ipz.pairing.zeros import ZeroPairing, in_band, pair_zeros
@@ -66,7 +66,8 @@ def pair_roots(fit: ModalFit, reduced_model: ReducedModel) -> Pairs:
     """
     require_type("fit", fit, ModalFit)
     require_type("reduced_model", reduced_model, ReducedModel)
-    poles = model_poles(reduced_model, fit.labels)
+    given = fit.modes_given
+    poles = model_poles(reduced_model, fit.labels) if given is None else model_shapes(reduced_model, given.dofs)
     pole_pairing = pair_poles(fit, poles)
     rows = _pole_rows(fit, poles, pole_pairing)
     paired_poles = _paired_logs(rows)

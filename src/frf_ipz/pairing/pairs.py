@@ -176,7 +176,8 @@ class Pairs(Tabulated, Drawn):
     warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        return f"Pairs: {self.count('pole').text}; {self.count('zero').text}"
+        counts = [self.count(kind) for kind in ("pole", "zero")]
+        return f"Pairs: {'; '.join(count.text for count in counts if count.measured or count.kind == 'pole')}"
 
     def count(self, kind: str) -> RootCount:
         """Count the measured poles or zeros by what pairing has found.

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.modes import modal_assurance
 from frf_ipz.pairing.frequency_scatter import NARROWER, frequency_cost
 from frf_ipz.pairing.matching import Hypothesis, Matching, match, mixed_probabilities
 from frf_ipz.pairing.model_roots import ModelPoles
@@ -71,11 +72,13 @@ def pair_poles(fit: ModalFit, model: ModelPoles) -> PolePairing:
     """
     measured = np.log(np.abs(fit.model.poles[: fit.n_modes]))
     computed = np.log(np.abs(model.values) + np.finfo(float).tiny)
-    amplitudes, noise = measured_amplitudes(fit)
-    shapes = np.zeros((len(measured), len(computed)))
     band = np.log(2 * np.pi * np.array(fit.band_hz))
+    shapes = np.zeros((len(measured), len(computed)))
     gains = np.ones(len(fit.labels))
-    for _ in range(ROUNDS):
+    if fit.modes_given is not None:
+        shapes = _direction_costs(fit.modes_given.as_model_has_them().shapes.T, model.amplitudes)
+    amplitudes, noise = measured_amplitudes(fit)
+    for _ in range(ROUNDS if fit.labels else 0):
         best, *_ = _tried(measured, computed, shapes, band)
         gains = _gains(amplitudes, model.amplitudes, noise, best.matching.partner)
         shapes = _shape_costs(amplitudes, model.amplitudes, noise, gains)
@@ -143,6 +146,12 @@ def _likely_factors(gaps: FloatArray, shapes: FloatArray, scatter: float) -> lis
         if all(abs(offsets[place] - other) > scatter for other in chosen):
             chosen.append(float(offsets[place]))
     return chosen
+
+
+def _direction_costs(measured: ComplexArray, computed: ComplexArray) -> FloatArray:
+    """Squared distance of shapes whose scale is not known: what the best factor leaves of each, as MAC has it."""
+    left_over = 1 - modal_assurance(measured.T, computed.T)
+    return np.asarray(np.minimum(left_over / AMPLITUDE_STD**2 * np.sqrt(measured.shape[1]), MAX_SHAPE))
 
 
 def _gains(measured: ComplexArray, computed: ComplexArray, noise: FloatArray, partner: IntArray) -> FloatArray:

@@ -20,6 +20,7 @@ from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.campaign import VibrationTest
 from frf_ipz.ingest.options import IngestOptions
 from frf_ipz.input_files import Ledger, digest_file, entering
+from frf_ipz.modes import ModalParameters
 from frf_ipz.pipeline.config import StageOptions
 from frf_ipz.pipeline.inputs import PipelineInputs, complete_model
 from frf_ipz.pipeline.run import run_chain, run_in_memory
@@ -55,7 +56,7 @@ class Campaign(Concise):
 
     Parameters
     ----------
-    data : FrfSet or VibrationTest
+    data : FrfSet, VibrationTest or ModalParameters
         What was measured.
     fe_model : StructuralModel, optional
         The FE model; without it the chain ends with the fit.
@@ -91,7 +92,7 @@ class Campaign(Concise):
     ['21:+z', '11:+z']
     """
 
-    data: FrfSet | VibrationTest
+    data: FrfSet | VibrationTest | ModalParameters
     fe_model: StructuralModel | None = None
     _: KW_ONLY
     points: Sequence[Dof | str] = ()
@@ -106,7 +107,7 @@ class Campaign(Concise):
     export: ExportOptions | None = None
 
     def __post_init__(self) -> None:
-        require_type("data", self.data, FrfSet, VibrationTest)
+        require_type("data", self.data, FrfSet, VibrationTest, ModalParameters)
         require_type("fe_model", self.fe_model, StructuralModel, optional=True)
         require_type("reference", self.reference, FrfSet, optional=True)
         require_each("effects", self.effects, Effect, Law)
@@ -144,6 +145,12 @@ class Campaign(Concise):
             run_chain(inputs, folder, until=until, diagnosing=None, progress=progress)
         return open_results(out)
 
+    def _test(self) -> VibrationTest:
+        if isinstance(self.data, VibrationTest):
+            return self.data
+        make = VibrationTest.from_modes if isinstance(self.data, ModalParameters) else VibrationTest.from_frfs
+        return make(self.data, name=self.name)  # type: ignore[arg-type]
+
     def inputs(self) -> PipelineInputs:
         """Check that everything fits together.
 
@@ -159,9 +166,8 @@ class Campaign(Concise):
         """
         chosen = {stage: getattr(self, stage) for stage in OPTIONS}
         options = replace(StageOptions(), **{stage: value for stage, value in chosen.items() if value is not None})
-        test = self.data if isinstance(self.data, VibrationTest) else VibrationTest.from_frfs(self.data, name=self.name)
-        test = without_sensors(test, options.ingest.hide)
         points = as_dofs(self.points)
+        test = without_sensors(self._test(), options.ingest.hide).with_forces_at(points)
         if self.fe_model is None and points:
             raise InputError("points of interest need an FE model; hand it in as the second argument")
         ledger = Ledger()
@@ -193,6 +199,10 @@ def _digest_test(test: VibrationTest) -> str:
     arrays = list(test.signals.values())
     if test.frfs is not None:
         arrays += [getattr(test.frfs, name) for name in ("frequency_hz", "values", "variance", "coherence", "averages")]
+    if test.modes is not None:
+        modes = test.modes
+        stds = [values for values in (modes.frequency_std_hz, modes.damping_ratio_std) if values is not None]
+        arrays += [modes.natural_frequency_hz, modes.damping_ratio, modes.shapes.real, modes.shapes.imag, *stds]
     return digest_arrays(arrays)
 
 

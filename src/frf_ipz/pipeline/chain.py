@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from frf_ipz.diagnosis.observations import WITHOUT_FRFS
+from frf_ipz.errors import InputError
 from frf_ipz.pipeline.stage_runner import StageRunner
 from frf_ipz.pipeline.stages import causes, hints, measurement, mismatch, modelling, outputs
 
@@ -52,14 +54,17 @@ def chain(
     options = inputs.options.diagnose
     diagnosis = found = None
     is_asked = diagnosing is True
+    if recordings.modes is not None and (is_asked or options.apply):
+        raise InputError(f"{inputs.source}: {WITHOUT_FRFS}")
     is_diagnosing = options.run != "never" if diagnosing is None else diagnosing
+    is_diagnosing &= recordings.modes is None
     is_known = model is not None and mismatch.is_known(runner)
     if not is_diagnosing and not is_known:
         store.mark_stale(mismatch.STAGES)
     if model is not None and is_diagnosing and options.apply:
         diagnosis = mismatch.diagnose(runner, model, frfs, is_asked=is_asked)
         model, frfs = mismatch.apply_diagnosis(runner, model, frfs, diagnosis)
-    fit = measurement.fit(runner, frfs, corrected_by=diagnosis)
+    fit = measurement.fit(runner, frfs, modes=recordings.modes, corrected_by=diagnosis)
     if inputs.test.has_frf_levels:
         mismatch.levels(runner, fit, recordings.frfs)
     yield "fit"

@@ -88,7 +88,7 @@ class PipelineInputs:
         return {
             "test_file": self.test.path.name,
             "model_file": Path(next(iter(self.model_names), "FE model")).name,
-            "is_recorded": self.test.kind != "frf",
+            "is_recorded": self.test.kind not in {"frf", "modes"},
         }
 
 
@@ -125,8 +125,8 @@ def read_inputs(path: Path) -> PipelineInputs:
 
 def _read_inputs(path: Path, ledger: Ledger) -> PipelineInputs:
     pipeline = read_pipeline(path)
-    test = _read_test(pipeline)
     points = _read_points(pipeline)
+    test = _read_test(pipeline).with_forces_at(points)
     fe_model = None if pipeline.model_path is None else _read_model(pipeline.model_path, test, points)
     if fe_model is None and points:
         raise FileFormatError(

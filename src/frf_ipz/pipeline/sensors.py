@@ -67,6 +67,11 @@ def without_sensors(test: VibrationTest, hidden: Sequence[str]) -> VibrationTest
         if dof not in names:
             raise InputError(f"there is no sensor at '{text}'; {did_you_mean(text, names.values())}")
     labels = tuple(label for label in test.labels if label.output_dof.unsigned not in left_out)
+    if test.modes is not None:
+        seen = [place for place, dof in enumerate(test.modes.dofs) if dof.unsigned not in left_out]
+        if seen:
+            dofs = tuple(test.modes.dofs[place] for place in seen)
+            return replace(test, modes=replace(test.modes, shapes=test.modes.shapes[seen], dofs=dofs), labels=labels)
     if not labels:
         raise InputError("this leaves no sensor; take one out of the list")
     return replace(test, labels=labels)

@@ -141,7 +141,11 @@ def describe_pole_zero_map(fit: ModalFit) -> Picture:
         One panel.
     """
     poles, covariance = fit.model.poles[: fit.n_modes], root_covariances(fit)
-    source = {"recordings": "the variance of the measured FRFs", "misfit": "the misfit of the fit"}
+    source = {
+        "recordings": "the variance of the measured FRFs",
+        "misfit": "the misfit of the fit",
+        "stated": "the test",
+    }
     names = [f"pole {mode}" for mode in range(1, len(poles) + 1)]
     layers = [*_ellipses(poles, covariance[: fit.n_modes], "poles", Role.INK)]
     layers.append(_roots(poles, "poles", names, Role.INK, frf=None))

@@ -85,7 +85,7 @@ def predict_frfs(
     """
     require_measured(measured)
     require_type("updated_model", updated_model, UpdatedModel)
-    labels, updated = measured.labels, updated_model
+    labels, updated = measured.connections, updated_model
     frequency_hz = take_array(
         "the frequencies", measured.frequency_hz if frequency_hz is None else frequency_hz, np.float64
     )
@@ -157,7 +157,9 @@ def _magnitude_bands(
 ) -> tuple[FloatArray, FloatArray]:
     bands = np.full((2, len(s), len(labels)), np.nan)
     if len(updated.ensemble):
-        error = estimate_model_error(measured, updated, ensemble, s) if isinstance(measured, ModalFit) else None
+        error = None
+        if isinstance(measured, ModalFit) and measured.labels:
+            error = estimate_model_error(measured, updated, ensemble, s)
         centre = as_ensemble(updated, ensemble.lowest_rad_s)
         for number, label in enumerate(labels):
             output, force = updated.model.row(label.output_dof), updated.model.row(label.input_dof)

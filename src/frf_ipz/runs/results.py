@@ -233,8 +233,8 @@ class Results:
 
     @property
     def frfs(self) -> FrfSet | None:
-        """The measured FRFs."""
-        return None if self.estimate is None else self.estimate.frfs
+        """The measured FRFs; None for a test of modes, which has none."""
+        return None if self.estimate is None or self.estimate.modes is not None else self.estimate.frfs
 
     @cached_property
     def fit(self) -> ModalFit | None:

@@ -176,6 +176,8 @@ def estimate_lines(estimate: FrfEstimate, *, coherence: str = "") -> list[tuple[
         Title and text of each line.
     """
     records, frfs = estimate.records, estimate.frfs
+    if estimate.modes is not None:
+        return [("measured", f"modes at {len(estimate.modes.dofs)} DOFs, no FRF"), *_notes(estimate.warnings)]
     lines = []
     if len(records):
         used = int(records["used"].astype(bool).sum())
@@ -202,6 +204,8 @@ def fit_lines(fit: ModalFit) -> list[tuple[str, str]]:
     values = ", ".join(f"{value:.6g}" for value in frequencies[:MOST_MODES])
     rest = f" and {fit.n_modes - MOST_MODES} more" if fit.n_modes > MOST_MODES else ""
     zeros = int(np.count_nonzero(fit.zeros.identifiable))
+    if fit.modes_given is not None:
+        return [("modes", f"{fit.n_modes} identified elsewhere: {values}{rest} Hz"), *_notes(fit.warnings)]
     return [
         ("fit", f"{fit.n_modes} modes: {values}{rest} Hz"),
         ("", f"{zeros} zeros with a number, {len(fit.zeros.values) - zeros} not identifiable"),
@@ -265,7 +269,8 @@ def pairs_lines(pairs: Pairs) -> list[tuple[str, str]]:
         Title and text of each line.
     """
     poles, zeros = (pairs.count(kind) for kind in ("pole", "zero"))
-    return [("pairs", poles.text), ("", zeros.text), *_notes(pairs.warnings)]
+    texts = [count.text for count in (poles, zeros) if count.measured or count is poles]
+    return [*(("" if place else "pairs", text) for place, text in enumerate(texts)), *_notes(pairs.warnings)]
 
 
 def update_lines(updated: UpdatedModel) -> list[tuple[str, str]]:

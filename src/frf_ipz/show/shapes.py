@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.dofs import Dof
     from frf_ipz.frf import FrfLabel
+    from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.runs.results import Results
     from frf_ipz.structure import Geometry, ReducedModel
 
@@ -94,9 +95,7 @@ def mode_shape(run: Results, number: int) -> Shape:
     fit = run.fit
     if fit is None or not 0 <= number < fit.n_modes:
         raise InputError(f"this run has no mode {number + 1}")
-    pole = complex(fit.model.poles[number])
-    powers = np.array([label.quantity.power for label in fit.labels])
-    measured = _largest_row(fit.labels, fit.model.residues[number] / pole**powers)
+    measured = _measured_shape(fit, number)
     frequency = float(natural_frequency_hz(fit.model.poles[number : number + 1])[0])
     models = _models(run, number)
     title = "measured" if models or run.updated_model is None else "measured; the model has no counterpart of this mode"
@@ -155,6 +154,15 @@ def operating_shape(run: Results, hertz: float, input_dof: str) -> Shape:
             raise InputError(f"the {name} model has no damping and resonates at {hertz:g} Hz; take another") from None
         motions.insert(0, Motion(name=name, title=name, dofs=model.expanded_dofs, values=motion))
     return Shape(title=f"At {frfs.frequency_hz[line]:.5g} Hz for 1 N at {input_dof}", motions=tuple(motions))
+
+
+def _measured_shape(fit: ModalFit, number: int) -> dict[Dof, complex]:
+    """Give the shape of a mode by DOF: as it was stated, or from residues."""
+    if fit.modes_given is not None:
+        modes = fit.modes_given.as_model_has_them()
+        return dict(zip(modes.dofs, modes.shapes[:, number].tolist(), strict=True))
+    powers = np.array([label.quantity.power for label in fit.labels])
+    return _largest_row(fit.labels, fit.model.residues[number] / fit.model.poles[number] ** powers)
 
 
 def _largest_row(labels: tuple[FrfLabel, ...], residues: ComplexArray) -> dict[Dof, complex]:

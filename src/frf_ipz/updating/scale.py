@@ -315,7 +315,7 @@ def fit_scale(
         Without gains where no mode is paired; with gains of 1 where the scale is known.
     """
     poles = [place for place, pair in enumerate(pairs.targets) if pair.kind == "pole"]
-    if not poles:
+    if not poles or not fit.labels:  # shapes without FRFs say nothing of a gain
         return MeasuredScale(kind=fit.unknown_scale)
     modes = np.array([pairs.targets[place].measured for place in poles])
     known = fit.gain if fit.unknown_scale == "none" else 1.0

@@ -149,6 +149,11 @@ def diagnosis(evidence: Evidence) -> Iterator[Check]:
     found = evidence.diagnosis
     if found is None:
         says, verdict, advice = "not looked for", Verdict.USABLE, "frf-ipz diagnose looks for what the model leaves out"
+        if not evidence.frfs.n_frfs:
+            says, advice = (
+                "not looked for: a diagnosis compares FRFs, and modes do not tell what the model leaves out",
+                "",
+            )
     elif not found.is_explained:
         says, verdict = "something is missing in the model that no known effect explains", Verdict.WITH_CARE
         advice = "see the section on the diagnosis"

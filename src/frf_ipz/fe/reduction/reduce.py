@@ -96,8 +96,8 @@ def reduce_model(
     return reduce_to_dofs(
         fe_model,
         options=options,
-        actuators=tuple(dict.fromkeys(label.input_dof for label in measured.labels)),
-        sensors=tuple(dict.fromkeys(label.output_dof for label in measured.labels)),
+        actuators=tuple(dict.fromkeys(label.input_dof for label in measured.connections)),
+        sensors=tuple(dict.fromkeys(label.output_dof for label in measured.connections)),
         points=as_dofs(points),
         band_hz=measured.band_hz,
         default_damping_ratio=default_damping_ratio,

@@ -38,6 +38,8 @@ def mode_shapes(fit: ModalFit) -> ModeSet:
         At all measured DOFs, unsigned and mass-normalised, where a driving point was measured; else at the sensors or
         at the excited DOFs, whichever are more, with the largest entry 1.
     """
+    if fit.modes_given is not None:
+        return fit.modes_given.as_model_has_them()
     poles = fit.model.poles[: fit.n_modes]
     outputs = tuple(dict.fromkeys(label.output_dof.unsigned for label in fit.labels))
     inputs = tuple(dict.fromkeys(label.input_dof.unsigned for label in fit.labels))

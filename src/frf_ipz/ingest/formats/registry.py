@@ -13,6 +13,7 @@ from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest import formats
 from frf_ipz.ingest.formats.file_arrays import ArrayFormat
 from frf_ipz.ingest.formats.frf_file import FrfFormat
+from frf_ipz.ingest.formats.modes_file import ModesFormat
 from frf_ipz.ingest.formats.recording import RecordingFormat, TableKeys
 from frf_ipz.ingest.formats.text_layout import read_head
 
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf
+    from frf_ipz.ingest.formats.modes_file import ModesSource
     from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents
+    from frf_ipz.modes import ModalParameters
 
 
 LARGEST = 1e100  # the square of a larger value may overflow
@@ -128,6 +131,36 @@ def find_array_format(head: bytes) -> ArrayFormat | None:
         None where it is no such file.
     """
     return next((candidate for candidate in _formats(ArrayFormat) if candidate.recognises(head)), None)
+
+
+def read_modes_file(source: ModesSource) -> ModalParameters:
+    """Read the modes of a file of any format.
+
+    Parameters
+    ----------
+    source : ModesSource
+        The file as the test describes it.
+
+    Returns
+    -------
+    ModalParameters
+        At least one mode.
+
+    Raises
+    ------
+    FileFormatError
+        If it cannot be read.
+    """
+    head = read_head(source.path)
+    for candidate in _formats(ModesFormat):
+        if candidate.holds_modes(source.path, head):
+            modes: ModalParameters = candidate.read_modes(source)
+            return modes
+    raise FileFormatError(
+        source.path,
+        "is of no known format for modes; expected is a universal file with data sets 55, or a CSV with the columns "
+        "mode,frequency_hz,damping_ratio,dof,real,imag",
+    )
 
 
 def _require_sizes(frf: MeasuredFrf) -> None:

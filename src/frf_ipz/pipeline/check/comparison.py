@@ -9,17 +9,20 @@ import numpy as np
 from frf_ipz.assessment.assess import compare_modes
 from frf_ipz.assessment.causes.columns import find_exchanged_columns
 from frf_ipz.assessment.causes.likely_cause import agrees, find_likely_cause
-from frf_ipz.assessment.causes.modal_comparison import FREQUENCY_SCALE, modes_of_peaks
+from frf_ipz.assessment.causes.modal_comparison import FREQUENCY_SCALE, measured_modes, modes_of_peaks
 from frf_ipz.errors import FrfIpzError
+from frf_ipz.identification.fit import fit_modes
 from frf_ipz.identification.peaks import find_peaks
 from frf_ipz.pipeline.check.look import Look
 from frf_ipz.plotting.wording import number
+from frf_ipz.rational import natural_frequency_hz
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.assessment.assessment import LikelyCause
     from frf_ipz.assessment.causes.cause import Situation
     from frf_ipz.ingest.frf_estimate import FrfEstimate
+    from frf_ipz.modes import ModalParameters
     from frf_ipz.pipeline.inputs import PipelineInputs
 
 FREQUENCIES = 8  # that are listed
@@ -41,6 +44,8 @@ def compare_with_model(inputs: PipelineInputs, estimate: FrfEstimate) -> Look:
     Look
         The peaks and the model's frequencies in the same band; what most likely has to be corrected.
     """
+    if estimate.modes is not None:
+        return _beside_stated_modes(inputs, estimate.modes)
     places, labels = inputs.places_of_mistakes, estimate.frfs.labels
     impacts = estimate.traces if inputs.test.kind == "hammer" else ()
     exchanged = find_exchanged_columns(impacts, labels, test_file=places["test_file"])
@@ -60,6 +65,19 @@ def compare_with_model(inputs: PipelineInputs, estimate: FrfEstimate) -> Look:
     beside = f"    model   {_listed(_in_band(situation))}"
     is_relative = estimate.frfs.unknown_scale != "none"
     return Look(lines=(line, beside), open_points=tuple(_open_points(situation, is_relative=is_relative)))
+
+
+def _beside_stated_modes(inputs: PipelineInputs, modes: ModalParameters) -> Look:
+    """Set the FE model's modes beside stated ones; of their shapes the pairing tells."""
+    fit = fit_modes(modes, options=inputs.options.fit)
+    lines = (f"  stated    {_listed(natural_frequency_hz(fit.model.poles))}",)
+    if inputs.fe_model is None:
+        return Look(lines=lines)
+    situation = compare_modes(measured_modes(fit), inputs.fe_model, **inputs.places_of_mistakes)
+    if situation is None:
+        return Look(lines=lines)
+    beside = f"    model   {_listed(_in_band(situation))}"
+    return Look(lines=(*lines, beside), open_points=tuple(_common_factor(situation)))
 
 
 def _open_points(situation: Situation, *, is_relative: bool) -> list[str]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.errors import InputError
+from frf_ipz.identification.fit import fit_modes
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.formats.frf_conventions import read_frf_source
 from frf_ipz.ingest.recording_files import RecordingFiles
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
     from frf_ipz.ingest.campaign import TestSetup, VibrationTest
     from frf_ipz.ingest.frf_estimate import FrfEstimate
+    from frf_ipz.modes import ModalParameters
     from frf_ipz.pipeline.config import StageOptions
 
 WHOLE_BYTES = 1 << 28  # of recordings, read within seconds; of more only the first block of each
@@ -106,6 +108,8 @@ def look_at_measurement(test: VibrationTest, options: StageOptions) -> tuple[Loo
     """
     estimate = estimate_frfs(test, options=options.ingest)
     notes = [f"  note      {text}" for text in estimate.warnings]
+    if estimate.modes is not None:
+        return _look_at_modes(estimate.modes, options), estimate
     if not len(estimate.records):
         return Look(lines=(_describe_frfs(estimate), *notes)), estimate
     rows: list[tuple[str, ...]] = []
@@ -119,6 +123,13 @@ def look_at_measurement(test: VibrationTest, options: StageOptions) -> tuple[Loo
     more = [f"  and {len(rows) - MOST_SETS} more"] if len(rows) > MOST_SETS else []
     lines = (*text_table(header, shown), *more, *notes)
     return Look(lines=lines, open_points=tuple(dict.fromkeys(open_points))), estimate
+
+
+def _look_at_modes(modes: ModalParameters, options: StageOptions) -> Look:
+    fit = fit_modes(modes, options=options.fit)
+    count, dofs = counted(len(modes.damping_ratio), "mode"), counted(len(modes.dofs), "DOF")
+    lines = [f"  read      {count} at {dofs}, {fit.n_modes} in the band; no FRF"]
+    return Look(lines=(*lines, *(f"  note      {text}" for text in fit.warnings)))
 
 
 def _describe_recording(blocks: Iterator[FloatArray], *, is_large: bool) -> str:

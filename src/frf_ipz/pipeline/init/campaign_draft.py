@@ -37,7 +37,9 @@ def draft_test(contents: FolderContents, places: Places) -> str:
     str
         Text of ``test.toml``.
     """
-    return _hammer_test(contents, places) if contents.recordings else _frf_test(contents)
+    if contents.recordings:
+        return _hammer_test(contents, places)
+    return _frf_test(contents) if contents.frfs else _modes_test(contents)
 
 
 def _head(contents: FolderContents) -> list[str]:
@@ -99,4 +101,11 @@ def _frf_test(contents: FolderContents) -> str:
     for path in contents.frfs:
         lines += ["", "[[frf]]", f"file = {quoted(contents.name(path))}"]
         lines.append(guessed('quantity = "accelerance"', "accelerance | mobility | receptance"))
+    return "\n".join(lines) + "\n"
+
+
+def _modes_test(contents: FolderContents) -> str:
+    modes = "" if contents.modes is None else contents.name(contents.modes)
+    lines = [*_head(contents), 'kind = "modes"', "", "[[modes]]", f"file = {quoted(modes)}"]
+    lines.append(with_comment('# input_dofs = ["1:+z"]', "where forces act in what is predicted"))
     return "\n".join(lines) + "\n"

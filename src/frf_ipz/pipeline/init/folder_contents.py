@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from frf_ipz.errors import InputError
+from frf_ipz.ingest.formats.modes_uff import holds_shapes
 from frf_ipz.ingest.formats.text_layout import sniff
 
 FRF_COLUMNS = frozenset({"frequency_hz", "output_dof", "input_dof"})
+MODES_COLUMNS = frozenset({"mode", "frequency_hz", "damping_ratio", "dof", "real"})
 DOF_COLUMNS = frozenset({"node", "direction"})
+UNIVERSAL = (".unv", ".uff")
 MATRIX = re.compile(
     r"^(?:(?P<stiffness>k|stiff\w*)|(?P<mass>m|mass)|(?P<damping>[bcd]|damp\w*))(?:[_-](?P<group>.+))?$", re.I
 )
@@ -29,6 +32,8 @@ class FolderContents:
         Tables of signals over time, and of FRFs.
     references : tuple of Path
         FRFs that were kept aside: by their names, or because there are recordings too.
+    modes : Path, optional
+        Modes that were identified elsewhere.
     dof_table : Path, optional
         ``dofs.csv``.
     matrices : dict of str to Path
@@ -41,6 +46,7 @@ class FolderContents:
     recordings: tuple[Path, ...]
     frfs: tuple[Path, ...]
     references: tuple[Path, ...]
+    modes: Path | None
     dof_table: Path | None
     matrices: dict[str, Path]
     groups: dict[str, dict[str, Path]]
@@ -66,12 +72,12 @@ def look_into(folder: Path) -> FolderContents:
     Returns
     -------
     FolderContents
-        With recordings, or with FRFs.
+        With recordings, with FRFs, or with modes.
 
     Raises
     ------
     InputError
-        If there is no such folder, or it holds neither.
+        If there is no such folder, or it holds none of them.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: there is no such folder; give the one that holds the recordings")
@@ -80,10 +86,13 @@ def look_into(folder: Path) -> FolderContents:
     columns = {path: _columns(path) for path in tables}
     dof_tables = [path for path in tables if columns[path] >= DOF_COLUMNS]
     all_frfs = [path for path in tables if columns[path] >= FRF_COLUMNS]
-    recordings = tuple(path for path in tables if path not in dof_tables and path not in all_frfs)
-    references = tuple(path for path in all_frfs if recordings or KEPT_ASIDE.search(path.stem))
+    modes = [path for path in tables if columns[path] >= MODES_COLUMNS]
+    modes += [path for path in files if path.suffix.lower() in UNIVERSAL and holds_shapes(path)]
+    others = {*dof_tables, *all_frfs, *modes}
+    recordings = tuple(path for path in tables if path not in others)
+    references = tuple(path for path in all_frfs if recordings or modes or KEPT_ASIDE.search(path.stem))
     frfs = tuple(path for path in all_frfs if path not in references)
-    if not recordings and not frfs:
+    if not recordings and not frfs and not modes:
         raise InputError(
             f"{folder}: holds no .csv with recordings or FRFs; put them there, one file an impact, then run init again"
         )
@@ -93,6 +102,7 @@ def look_into(folder: Path) -> FolderContents:
         recordings=recordings,
         frfs=frfs,
         references=references,
+        modes=next(iter(modes), None),
         dof_table=next(iter(dof_tables), None),
         matrices=matrices,
         groups=groups,

@@ -103,5 +103,6 @@ def _taken_for(contents: FolderContents) -> list[str]:
         texts.append(f"{', '.join(names)}: matrices of an FE model; it needs also: {', '.join(missing)}")
     if contents.dof_table is not None:
         texts.append(f"{contents.name(contents.dof_table)}: rows of the matrices")
+    texts += [] if contents.modes is None else [f"{contents.name(contents.modes)}: modes without FRFs"]
     texts += [f"{contents.name(path)}: FRFs kept aside, no recording" for path in contents.references]
     return texts

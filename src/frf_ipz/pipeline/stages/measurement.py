@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
+    from frf_ipz.modes import ModalParameters
     from frf_ipz.pipeline.stage_runner import StageRunner
+    from frf_ipz.runs.folder import Writers
 
 
 def ingest(runner: StageRunner) -> FrfEstimate:
@@ -40,14 +42,24 @@ def ingest(runner: StageRunner) -> FrfEstimate:
         "ingest",
         {"options": asdict(options), "test": repr(runner.inputs.test), "files": files},
         lambda progress: estimate_frfs(runner.inputs.test, options=options, progress=progress),
-        lambda result: {
-            "frf.parquet": partial(write_table, tables.frf_table(result.frfs)),
-            "records.parquet": partial(write_table, tables.record_table(result)),
-        },
+        lambda result: (
+            {}
+            if result.modes is not None
+            else {
+                "frf.parquet": partial(write_table, tables.frf_table(result.frfs)),
+                "records.parquet": partial(write_table, tables.record_table(result)),
+            }
+        ),
     )
 
 
-def fit(runner: StageRunner, frfs: FrfSet, *, corrected_by: Diagnosis | None = None) -> ModalFit:
+def fit(
+    runner: StageRunner,
+    frfs: FrfSet,
+    *,
+    modes: ModalParameters | None = None,
+    corrected_by: Diagnosis | None = None,
+) -> ModalFit:
     """Turn FRFs into poles, residues and zeros.
 
     Parameters
@@ -56,6 +68,8 @@ def fit(runner: StageRunner, frfs: FrfSet, *, corrected_by: Diagnosis | None = N
         Inputs, folder and keys of the earlier stages.
     frfs : FrfSet
         The measured FRFs.
+    modes : ModalParameters, optional
+        Modes of a test that has no FRFs.
     corrected_by : Diagnosis, optional
         What they were corrected by, if they were.
 
@@ -68,14 +82,23 @@ def fit(runner: StageRunner, frfs: FrfSet, *, corrected_by: Diagnosis | None = N
     return runner.stage(
         "fit",
         {"options": asdict(options), "after": runner.after("ingest"), "corrected": corrections(corrected_by)},
-        lambda progress: fit_modes(frfs, options=options, progress=progress),
-        lambda result: {
-            "frf.parquet": partial(write_table, tables.frf_table(without_window(frfs, result.model))),
-            "poles.parquet": partial(write_table, tables.pole_table(result)),
-            "zeros.parquet": partial(write_table, tables.zero_table(result)),
-            "fit.parquet": partial(write_table, tables.misfit_table(result)),
-            "modes.parquet": partial(
-                write_table, tables.mode_table(result, scale_is_known=frfs.unknown_scale == "none")
-            ),
-        },
+        lambda progress: fit_modes(frfs if modes is None else modes, options=options, progress=progress),
+        lambda result: _files_of_fit(frfs, result),
     )
+
+
+def _files_of_fit(frfs: FrfSet, result: ModalFit) -> Writers:
+    """Write the modes; and, where there are FRFs, them, their zeros and what the fit leaves of them."""
+    scale_is_known = frfs.unknown_scale == "none"
+    files: Writers = {
+        "poles.parquet": partial(write_table, tables.pole_table(result)),
+        "modes.parquet": partial(write_table, tables.mode_table(result, scale_is_known=scale_is_known)),
+    }
+    if not frfs.n_frfs:
+        return files
+    return {
+        **files,
+        "frf.parquet": partial(write_table, tables.frf_table(without_window(frfs, result.model))),
+        "zeros.parquet": partial(write_table, tables.zero_table(result)),
+        "fit.parquet": partial(write_table, tables.misfit_table(result)),
+    }

@@ -83,8 +83,8 @@ def reduce(
         lambda _: reduce_to_dofs(
             model,
             options=options,
-            actuators=_once(label.input_dof for label in modal_fit.labels),
-            sensors=_once(label.output_dof for label in modal_fit.labels),
+            actuators=_once(label.input_dof for label in modal_fit.connections),
+            sensors=_once(label.output_dof for label in modal_fit.connections),
             points=inputs.points,
             band_hz=modal_fit.band_hz,
         ),

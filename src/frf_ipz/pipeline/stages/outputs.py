@@ -64,10 +64,15 @@ def predict(runner: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, frf
     inputs = runner.inputs
     if inputs.reference is not None:
         runner.stage("reference", {"file": inputs.digests[inputs.reference_name]}, lambda _: inputs.reference)
-    lines = frfs.frequency_hz[frfs.in_band(modal_fit.band_hz)]
+    # without measured FRFs no line was measured but those of the reference
+    measured = frfs if frfs.n_frfs or inputs.reference is None else inputs.reference
+    lines = measured.frequency_hz[measured.in_band(modal_fit.band_hz)]
     return runner.stage(
         "predict",
-        {"points": repr(inputs.points), "after": runner.after("update")},
+        {
+            "points": repr(inputs.points),
+            "after": runner.after("update", *(("reference",) if measured is inputs.reference else ())),
+        },
         lambda _: predict_frfs(modal_fit, updated, points=inputs.points, frequency_hz=lines),
         lambda result: {"poi_frf.parquet": partial(write_table, tables.prediction_table(result))},
     )

@@ -26,7 +26,9 @@ def build(run: Results) -> Section | None:
     """
     overlays = overlay_pictures(run)
     if not overlays:
-        return None
+        shapes = tuple(run_figures(run, "mac"))
+        lead = "The mode shapes of the measurement and of the model; no FRF was measured."
+        return Section(anchor="comparison", title="Measured and model", lead=lead, blocks=shapes) if shapes else None
     choice = Choice(name="overlay", label="FRF", pictures=overlays)
     return Section(
         anchor="comparison",

@@ -196,7 +196,8 @@ def _cards_without_model(run: Results) -> list[Card]:
 def _deviation_card(run: Results) -> Card:
     deviation = deviation_of(run)
     if deviation is None:
-        return Card("Error at the measured points", "unknown", "no FRF stands above its noise")
+        why = "no FRF was measured" if run.frfs is None else "no FRF stands above its noise"
+        return Card("Error at the measured points", "unknown", why)
     figures = [deviation.nominal_db, deviation.updated_db, deviation.with_causes_db]
     figure = " → ".join(f"{value:.2g}" for value in figures if np.isfinite(value)) + " dB"
     names = "before updating, after" + (", with the causes in the model" if np.isfinite(figures[2]) else "")

@@ -34,14 +34,12 @@ def build(run: Results) -> Section | None:
     if fit is None:
         return None
     known = int(np.count_nonzero(fit.zeros.identifiable))
-    lead = (
-        f"{counted(fit.n_modes, 'pole')} shared by all FRFs, and {counted(known, 'zero')} of single FRFs with a number"
-        + (
-            f"; {len(fit.zeros.values) - known} more that the data do not support."
-            if known < len(fit.zeros.values)
-            else "."
-        )
-    )
+    n_unknown = len(fit.zeros.values) - known
+    rest = f"; {n_unknown} more that the data do not support." if n_unknown else "."
+    zeros = f"{counted(known, 'zero')} of single FRFs with a number{rest}"
+    lead = f"{counted(fit.n_modes, 'pole')} shared by all FRFs, and {zeros}"
+    if fit.modes_given is not None:
+        lead = f"{counted(fit.n_modes, 'mode')} identified elsewhere; zeros belong to FRFs, and none was measured."
     blocks: list[Block] = [
         *run_figures(run, "poles", hints={"pole-zero-map": "Zoom in to see small ellipses."}),
         _mode_table(fit),

@@ -36,7 +36,8 @@ def build(run: Results) -> Section | None:
         return None
     known = measured_at(prediction, run.reference) or measured_at(prediction, run.frfs)
     points = listed([str(dof) for dof in run.points])
-    lead = f"{counted(len(prediction.labels), 'FRF')} predicted at {points}, in the quantity that was measured."
+    quantity = "quantity that was measured" if run.frfs is not None else "quantity that the test names"
+    lead = f"{counted(len(prediction.labels), 'FRF')} predicted at {points}, in the {quantity}."
     if not known:
         lead += " Nothing was measured there."
     lead += f" {'The first' if len(prediction.labels) > 1 else 'It'} is drawn on the first screen."

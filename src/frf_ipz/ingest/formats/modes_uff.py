@@ -1,0 +1,188 @@
+"""Modes as universal files (UFF): data sets 55 of normal modes (analysis type 2) and complex modes (3), in text.
+
+What the records hold: Universal File Datasets Summary, number 55, Structural Dynamics Research Laboratory, University
+of Cincinnati. DOFs that are 0 in every mode were not measured: nodes without a sensor in a direction hold a 0 there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.dofs import DIRECTIONS, Dof
+from frf_ipz.errors import FileFormatError
+from frf_ipz.ingest.formats.modes_file import ModesSource, make_modes
+from frf_ipz.ingest.formats.universal_file import is_universal
+from frf_ipz.input_files import read_bytes
+from frf_ipz.rational import damping_ratio, natural_frequency_hz
+from frf_ipz.text_numbers import NumberError, parse_numbers
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.modes import ModalParameters
+
+END = "-1"
+NORMAL_MODE, COMPLEX_MODE = 2, 3
+REAL, COMPLEX = (2, 4), (5, 6)  # types of data, of single and of double precision
+PER_LINE = 6  # numbers
+LARGEST = 999_999_999  # integer of a field of ten columns
+N_NAMES = 5  # lines of text before the numbers
+ADVICE = "export the modes again, as data sets 55 with normal or complex modes"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Shape:
+    """One data set 55."""
+
+    frequency_hz: float
+    ratio: float
+    values: dict[int, ComplexArray]  # by node
+
+
+class _ModesUff:
+    rank = 0
+
+    def holds_modes(self, path: Path, head: bytes) -> bool:
+        del path
+        return is_universal(head)
+
+    def read_modes(self, source: ModesSource) -> ModalParameters:
+        lines = read_bytes(source.path).decode("latin-1").splitlines()
+        shapes = [_read_shape(source.path, lines, *ends) for ends in _data_sets(lines)]
+        if not shapes:
+            raise FileFormatError(source.path, f"holds no mode shape (data set 55); {ADVICE}")
+        nodes = list(dict.fromkeys(node for shape in shapes for node in shape.values))
+        for place, shape in enumerate(shapes):
+            lacking = [node for node in nodes if node not in shape.values]
+            if lacking:
+                problem = (
+                    f"its mode {place + 1} ({shape.frequency_hz:g} Hz) has no node {lacking[0]}, which others have"
+                )
+                raise FileFormatError(source.path, f"{problem}; {ADVICE}")
+        width = max(len(value) for shape in shapes for value in shape.values.values())
+        table = np.zeros((len(nodes), width, len(shapes)), complex)
+        for place, shape in enumerate(shapes):
+            for row, node in enumerate(nodes):
+                table[row, : len(shape.values[node]), place] = shape.values[node]
+        measured = np.argwhere(table.any(axis=2))
+        return make_modes(
+            source,
+            natural_frequency_hz=np.array([shape.frequency_hz for shape in shapes]),
+            damping_ratio=np.array([shape.ratio for shape in shapes]),
+            shapes=table[measured[:, 0], measured[:, 1]],
+            dofs=tuple(Dof(nodes[row], DIRECTIONS[column]) for row, column in measured.tolist()),
+        )
+
+
+FORMAT = _ModesUff()
+
+
+def holds_shapes(path: Path) -> bool:
+    """Tell whether a file is a universal file with mode shapes and without functions.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    bool
+        True where it is.
+    """
+    data = read_bytes(path)
+    return is_universal(data[:4096]) and bool(_data_sets(data.decode("latin-1").splitlines()))
+
+
+def _data_sets(lines: list[str]) -> list[tuple[int, int]]:
+    """Find the data sets 55: first line after their number, and the line behind their last."""
+    marks = [number for number, line in enumerate(lines) if line.strip() == END]
+    return [
+        (begin + 2, end)
+        for begin, end in zip(marks[::2], [*marks[1::2], len(lines)], strict=False)
+        if begin + 1 < len(lines) and lines[begin + 1].strip() == "55"
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _DataSet:
+    """Lines of one data set 55."""
+
+    path: Path
+    lines: list[str]
+    end: int
+
+    def numbers(self, line: int, width: int, count: int, what: str) -> list[float]:
+        """Read numbers by the blanks between them, or by columns where they touch."""
+        text = self.lines[line] if line < self.end else ""
+        for fields in (text.split(), [text[at : at + width] for at in range(0, len(text.rstrip()), width)]):
+            try:
+                values = parse_numbers([field.strip() for field in fields])
+            except NumberError:
+                continue
+            if len(values) >= count:
+                return [float(value) for value in values]
+        problem = f"{what} should stand there, {count} numbers at least; the file is cut off, or none"
+        raise self.fault(problem, line)
+
+    def integers(self, line: int, width: int, count: int, what: str) -> list[int]:
+        """Read integers of at most nine digits."""
+        values = self.numbers(line, width, count, what)
+        if any(value != round(value) or abs(value) > LARGEST for value in values[:count]):
+            raise self.fault(f"{what} should stand there, as integers", line)
+        return [round(value) for value in values[:count]]
+
+    def fault(self, problem: str, line: int) -> FileFormatError:
+        return FileFormatError(self.path, f"{problem}; {ADVICE}", where=f"line {min(line, self.end - 1) + 1}")
+
+
+def _read_shape(path: Path, lines: list[str], first: int, end: int) -> _Shape:
+    data = _DataSet(path=path, lines=lines, end=end)
+    at = first + N_NAMES
+    _, analysis, _, _, data_type, n_values = data.integers(at, 10, 6, "the types of a data set 55")
+    is_complex = data_type in COMPLEX
+    if analysis not in (NORMAL_MODE, COMPLEX_MODE) or not (is_complex or data_type in REAL):
+        raise data.fault(f"the analysis of type {analysis} with data of type {data_type} is no mode that is read", at)
+    if not 1 <= n_values <= len(DIRECTIONS):
+        raise data.fault(f"{n_values} values a node; a node has 1 to 6", at)
+    n_real = data.integers(at + 1, 10, 2, "the counts of a data set 55")[1]
+    frequency_hz, ratio = _read_pole(data, at + 2, analysis, n_real)
+    n_numbers = n_values * (2 if is_complex else 1)
+    motions = _read_motions(data, at + 3 + max(0, -(-n_real // PER_LINE) - 1), n_numbers)
+    values = {node: row[::2] + 1j * row[1::2] if is_complex else row.astype(complex) for node, row in motions.items()}
+    return _Shape(frequency_hz=frequency_hz, ratio=ratio, values=values)
+
+
+def _read_pole(data: _DataSet, line: int, analysis: int, n_real: int) -> tuple[float, float]:
+    """Read frequency and damping ratio; a loss factor is twice the viscous ratio that dissipates as much."""
+    values = data.numbers(line, 13, min(max(n_real, 2), 4), "the frequency of a mode")
+    if analysis == COMPLEX_MODE:
+        pole = np.array(complex(values[0], abs(values[1])))
+        frequency_hz, ratio = float(natural_frequency_hz(pole)), float(damping_ratio(pole))
+    else:
+        viscous, hysteretic = (*values[2:4], 0.0, 0.0)[:2]
+        frequency_hz, ratio = values[0], viscous or hysteretic / 2
+    if not ratio > 0:
+        problem = f"the mode at {frequency_hz:g} Hz has no damping; a test needs it: state the modes in a CSV"
+        raise FileFormatError(data.path, problem, where=f"line {line + 1}")
+    return frequency_hz, ratio
+
+
+def _read_motions(data: _DataSet, line: int, n_numbers: int) -> dict[int, FloatArray]:
+    """Read the numbers of each node, on as many lines as they take."""
+    of_nodes: dict[int, FloatArray] = {}
+    while line < data.end:
+        node = data.integers(line, 10, 1, "the number of a node")[0]
+        row: list[float] = []
+        while len(row) < n_numbers:
+            line += 1
+            row += data.numbers(line, 13, min(n_numbers - len(row), PER_LINE), f"the motion of node {node}")
+        of_nodes[node] = np.array(row[:n_numbers])
+        line += 1
+    if not of_nodes:
+        raise data.fault("the motion of at least one node should stand there", line)
+    return of_nodes
