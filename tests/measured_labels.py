@@ -5,4 +5,4 @@ from types import SimpleNamespace
 
 def measured(labels, frequency_hz=None):
     """Stand for what was measured: labels, and lines where they count."""
-    return SimpleNamespace(labels=tuple(labels), frequency_hz=frequency_hz, band_hz=None)
+    return SimpleNamespace(labels=tuple(labels), connections=tuple(labels), frequency_hz=frequency_hz, band_hz=None)

@@ -78,7 +78,9 @@ def test_a_reference_judges_the_prediction(tmp_path):
     label = frf_ipz.FrfLabel(POINT, POINT, "accelerance")
     lines = np.arange(10.0, 400.0, 0.5)
     values = frf_ipz.compute_frfs(softer_beam(), [label], 2j * np.pi * lines)[:, 0]
-    rows = [f"{f!r},{POINT},{POINT},{v.real!r},{v.imag!r}" for f, v in zip(lines.tolist(), values.tolist(), strict=True)]
+    rows = [
+        f"{f!r},{POINT},{POINT},{v.real!r},{v.imag!r}" for f, v in zip(lines.tolist(), values.tolist(), strict=True)
+    ]
     (tmp_path / "poi.csv").write_text("\n".join(["frequency_hz,output_dof,input_dof,real,imag", *rows]) + "\n")
     path = write_campaign(tmp_path, stated_modes(2), pipeline=PIPELINE + 'reference = "poi.csv"\n')
     results = frf_ipz.run_pipeline(path, tmp_path / "out", until="predict")
@@ -140,6 +142,6 @@ def test_hidden_sensors_and_left_out_modes(tmp_path):
     assert results.to_frame("decisions")["reason"].tolist() == ["outside of the band"]
 
 
-def test_deviations_that_are_not_stated_are_said(tmp_path):
+def test_deviations_that_are_not_stated_are_said():
     modes = stated_modes(9, frequency_std_hz=None, damping_ratio_std=None)
     assert "not stated" in frf_ipz.fit_modes(modes).warnings[0]
