@@ -9,7 +9,7 @@ import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import InputError
-from frf_ipz.identification.noise import misfit_variance, rough_variance
+from frf_ipz.identification.noise import BLOCK_LINES, misfit_variance, rough_variance
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
@@ -164,7 +164,7 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
     noise = np.where(known, frfs.variance, np.nan)
     if not known.all():
         noise[:, ~known] = rough_variance(frfs.values[:, ~known])
-    band = options.band_hz or _signal_band(frfs, noise, usable)
+    band = options.band_hz or _signal_band(frfs, noise, usable, has_variance=bool(known.all()))
     independent = np.arange(frfs.n_lines) % frfs.correlated_lines == 0
     used = usable & independent & frfs.in_band(band, options.exclude_hz)
     if used.sum() < FEWEST_LINES:
@@ -208,8 +208,11 @@ def with_misfit_noise(lines: MeasuredLines, misfit: ComplexArray) -> MeasuredLin
     if lines.known.all():
         return lines
     variance = lines.variance.copy()
-    floor = (MODEL_ERROR * np.abs(lines.receptance)) ** 2
-    variance[:, ~lines.known] = (misfit_variance(misfit, np.abs(lines.receptance)) + floor)[:, ~lines.known]
+    size = np.abs(lines.receptance)
+    # noise is even over the lines in the quantity that was measured: as a receptance it falls by 12 dB an octave
+    to_measured = np.abs(lines.s[:, None]) ** lines.powers
+    noise = misfit_variance(misfit * to_measured, size * to_measured) / to_measured**2
+    variance[:, ~lines.known] = (noise + (MODEL_ERROR * size) ** 2)[:, ~lines.known]
     return replace(lines, variance=variance)
 
 
@@ -222,8 +225,11 @@ def _usable(frfs: FrfSet, known: BoolArray) -> BoolArray:
     return np.asarray(usable)
 
 
-def _signal_band(frfs: FrfSet, noise: FloatArray, usable: BoolArray) -> tuple[float, float]:
+def _signal_band(frfs: FrfSet, noise: FloatArray, usable: BoolArray, *, has_variance: bool) -> tuple[float, float]:
     """Find the band that carries signal, where the user gives none."""
+    lines_hz = frfs.frequency_hz[usable]
+    if not has_variance and 0 < len(lines_hz) < 2 * BLOCK_LINES:  # too few to tell noise from peaks without a model
+        return float(lines_hz[0]), float(lines_hz[-1])
     is_known = np.isfinite(noise) & (noise > 0)
     ratio = np.divide(np.abs(frfs.values) ** 2, noise, out=np.zeros(frfs.values.shape), where=is_known)
     carries = np.median(ratio[usable], axis=0) > SIGNAL**2 if usable.any() else np.zeros(frfs.n_frfs, bool)

@@ -379,3 +379,19 @@ def test_tables_of_a_clean_fit():
     assert np.sqrt(np.mean(fit.misfit["ratio"] ** 2)) == pytest.approx(1.0, abs=0.02)
     assert fit.stabilization["stable_frequency"].any()
     assert set(fit.stabilization) >= {"order", "frequency_hz", "damping_ratio", "stable_shape", "taken"}
+
+
+@pytest.mark.parametrize("lines_hz", [np.linspace(25.0, 800.0, 32), np.geomspace(10.0, 800.0, 32)], ids=["even", "log"])
+def test_lines_farther_apart_than_peaks_are_wide(lines_hz):
+    truth = random_modes([31.0, 118.0, 247.0, 405.0, 620.0], 0.005, n_outputs=3, n_inputs=1, seed=SEED + 1)
+    frfs = accelerances(truth, lines_hz, noise=1e-4, seed=SEED + 1)
+    assert_complete(fit_modes(frf_set(lines_hz, frfs.values, frfs.labels), options=FitOptions()), truth)
+
+
+def test_noise_that_is_even_in_what_was_measured_is_no_model_error():
+    truth = random_modes([31.0, 118.0, 247.0, 405.0, 620.0], 0.005, n_outputs=2, n_inputs=1, seed=SEED + 1)
+    lines_hz = np.arange(5.0, 801.0)
+    frfs = accelerances(truth, lines_hz, noise=1e-4, seed=SEED + 1)
+    fit = fit_modes(frf_set(lines_hz, frfs.values, frfs.labels), options=FitOptions())
+    assert_complete(fit, truth)
+    assert fit.warnings == ()

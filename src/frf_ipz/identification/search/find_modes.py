@@ -15,7 +15,7 @@ import pandas as pd
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NoModesError
-from frf_ipz.identification.likelihood.compression import response
+from frf_ipz.identification.likelihood.compression import compress, response
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
 from frf_ipz.identification.likelihood.sandwich import pole_variance_factors
 from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms, smooth_terms_of_band
@@ -23,7 +23,7 @@ from frf_ipz.identification.measured_lines import MeasuredLines, measured_lines,
 from frf_ipz.identification.search.delays import CommonDelay, common_delay, each_delay
 from frf_ipz.identification.search.drift import Drift
 from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, assess_fit, peak_levels
-from frf_ipz.identification.search.selection import SelectedModes, select_modes
+from frf_ipz.identification.search.selection import ROUGH_ITERATIONS, SelectedModes, select_modes
 from frf_ipz.identification.stabilization import find_start_poles
 from frf_ipz.progress import Progress, silent
 
@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     from frf_ipz.identification.options import FitOptions
 
 FIXED_POLES = 3  # beside the band, while modes are searched
+NOISE_ROUNDS = 3  # of fitting the start poles and estimating the noise in turn
+FAR_LOWER = 0.25  # of a variance: the estimates themselves scatter by less
+LEAST_SPARE = 0.25  # of the numbers that an FRF has must be left to tell the noise of a model
 MODEL_ERROR = 1.3  # misfit over noise above which the model, not the noise, limits the fit
 
 
@@ -113,6 +116,7 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
     progress(0.05, "looking for first poles")
     start = find_start_poles(frfs, lines, max_order=options.max_order)
     terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(FIXED_POLES)
+    lines = _with_noise_beside_peaks(lines, start.poles, terms)
     progress(0.2, "adding and dropping poles")
     noise_is_known = bool(lines.known.all())
 
@@ -141,6 +145,24 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
         progress(0.55, "adding and dropping poles by the model error")
         fitted = _against_model_error(fitted, options)
     return fitted
+
+
+def _with_noise_beside_peaks(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms) -> MeasuredLines:
+    """Estimate anew the noise of FRFs whose peaks, on lines as far apart as their widths, were taken for it."""
+    for _ in range(NOISE_ROUNDS):
+        data = lines.weighted(shared=True)
+        system = compress(data, poles, terms)
+        spare = 1.0 - (system.n_linear + 2 * system.n_poles / lines.receptance.shape[1]) / (2 * len(lines.s))
+        if lines.known.all() or spare < LEAST_SPARE:
+            break
+        misfit = lines.receptance - response(system, terms, lines.s)
+        variance = with_misfit_noise(lines, misfit).variance / spare
+        is_lower = lines.receptance.any(axis=0) & (np.median(variance / lines.variance, axis=0) < FAR_LOWER)
+        if not is_lower.any():
+            break
+        lines = replace(lines, variance=np.where(is_lower, variance, lines.variance))
+        poles = refine_poles(lines.weighted(shared=True), poles, terms, iterations=ROUGH_ITERATIONS).poles
+    return lines
 
 
 def _against_model_error(fitted: FittedModes, options: FitOptions) -> FittedModes:
