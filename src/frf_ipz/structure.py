@@ -21,7 +21,6 @@ from frf_ipz.display import Concise, Drawn
 from frf_ipz.dofs import GENERALISED, Dof, as_dofs
 from frf_ipz.errors import InputError, ShapeError
 from frf_ipz.numerics.constraints import AdmissibleMotions
-from frf_ipz.numerics.definiteness import massless_rows
 from frf_ipz.numerics.neighbours import lines_between_neighbours
 from frf_ipz.numerics.structural_matrices import MatrixOptions, ModelMatrices
 from frf_ipz.unit_systems import SI, UnitSystem
@@ -145,6 +144,8 @@ class StructuralModel(Drawn):
         omega^2)``, which is right at its resonance; it couples no modes.
     motions : AdmissibleMotions, optional
         Where constraint equations join DOFs: the motions that satisfy them.
+    n_massless : int
+        Independent motions without mass, which follow the others statically.
     allows_negative_stiffness : bool
         Negative eigenvalues of the stiffness are meant: magnets, buckling. The poles of such a mode are real.
     notes : tuple of str
@@ -186,6 +187,7 @@ class StructuralModel(Drawn):
     parts: tuple[Part, ...] = ()
     structural_damping_all: Matrix | None = None
     motions: AdmissibleMotions | None = None
+    n_massless: int = 0
     allows_negative_stiffness: bool = False
     held_dofs: tuple[Dof, ...] = ()
     notes: tuple[str, ...] = ()
@@ -328,6 +330,7 @@ class StructuralModel(Drawn):
             damping_all=matrices.damping,
             structural_damping_all=matrices.structural_damping if matrices.structural_damping.nnz else None,
             motions=matrices.motions,
+            n_massless=matrices.n_massless,
             allows_negative_stiffness=allow_negative_stiffness,
             modal_damping=modal_damping,
             geometry=geometry,
@@ -370,10 +373,10 @@ class StructuralModel(Drawn):
 
     @property
     def n_modes(self) -> int:
-        """Number of modes: that of the free DOFs that have mass and follow from no others."""
+        """Number of modes: that of the free DOFs that follow from no others, less the motions without mass."""
         motions = self.free_motions
-        mass = self.mass if motions is None else motions.reduced(self.mass)
-        return int(np.count_nonzero(~massless_rows(mass)))
+        n_independent = np.count_nonzero(~self.fixed) if motions is None else len(motions.independent)
+        return int(n_independent) - self.n_massless
 
     def full_index(self, dof: Dof) -> int:
         """Row of a DOF among all, the held ones included.

@@ -102,8 +102,11 @@ def massless_rows(mass: Matrix) -> BoolArray:
     return np.asarray(sizes <= (NOTHING * float(np.median(sizes[sizes > 0])) if sizes.any() else 0.0))
 
 
-def require_mass(mass: Matrix, stiffness: Matrix, dofs: Sequence[Dof]) -> None:
-    """Refuse a mass matrix that is not positive definite beside rows that hold nothing.
+def count_massless_motions(mass: Matrix, stiffness: Matrix, dofs: Sequence[Dof]) -> int:
+    """Count the motions that have no mass, and refuse a mass matrix that no structure has.
+
+    Motions without mass are DOFs of which the mass has nothing, and combinations of others: rotations of lumped masses,
+    knots of shells. They follow the others statically, which they can only where the stiffness holds them.
 
     Parameters
     ----------
@@ -112,11 +115,15 @@ def require_mass(mass: Matrix, stiffness: Matrix, dofs: Sequence[Dof]) -> None:
     dofs : sequence of Dof
         Their rows.
 
+    Returns
+    -------
+    int
+        The nullity of the mass; of a large matrix only its rows that hold nothing.
+
     Raises
     ------
     InputError
-        If no DOF has mass, a motion of those that have some has none or a negative one, or a motion without mass meets
-        no stiffness.
+        If no DOF has mass, a motion has a negative one, or one without mass meets no stiffness.
     """
     diagonal, massless = mass.diagonal(), massless_rows(mass)
     if massless.all():
@@ -127,44 +134,68 @@ def require_mass(mass: Matrix, stiffness: Matrix, dofs: Sequence[Dof]) -> None:
             f"the DOF {dofs[worst].name} (row {worst + 1}) has the mass {diagonal[worst]:.4g}, which no structure has; "
             "export the mass matrix that the FE program computes modes with"
         )
-    if massless.any():
-        _require_held_by_stiffness(stiffness, np.flatnonzero(massless), dofs)
     moving = np.flatnonzero(~massless)
     scale = sparse.diags_array(1 / np.sqrt(diagonal[moving]))
     scaled = sparse.csr_array(scale @ mass[moving][:, moving] @ scale)
-    named = [dofs[row] for row in moving.tolist()]
-    if len(named) <= DENSE_ORDER:
-        smallest, motion = _smallest_eigenpair(scaled)
-        is_definite, where = smallest > SINGULAR_MASS, f", most of all at the DOF {named[int(np.argmax(motion))].name}"
-    else:
-        is_definite, where = is_positive_definite(_shifted(scaled, -SINGULAR_MASS), _nodes(named)), ""
-    if not is_definite:
-        raise InputError(
-            f"the mass matrix is not positive definite: a motion has no mass or a negative one{where}; "
-            "export the mass matrix that the FE program computes modes with",
-        )
+    count = int(massless.sum())
+    if len(dofs) > DENSE_ORDER:
+        if not is_positive_definite(_shifted(scaled, SINGULAR_MASS), _nodes([dofs[row] for row in moving.tolist()])):
+            raise _negative_mass("")
+        if count or not is_positive_definite(_shifted(scaled, -SINGULAR_MASS), _nodes(dofs)):
+            _require_held_by_stiffness(mass, stiffness, dofs)
+        return count
+    smallest, motion = _smallest_eigenpair(scaled)
+    if smallest < -SINGULAR_MASS:
+        raise _negative_mass(f", most of all at the DOF {dofs[int(moving[np.argmax(motion)])].name}")
+    without = np.eye(len(dofs))[:, massless]
+    if smallest <= SINGULAR_MASS:
+        values, vectors = linalg.eigh(scaled.toarray())
+        combinations = np.zeros((len(dofs), int(np.count_nonzero(values <= SINGULAR_MASS))))
+        combinations[moving] = vectors[:, : combinations.shape[1]] / np.sqrt(diagonal[moving])[:, None]
+        without = np.hstack([without, combinations])
+    if without.shape[1]:
+        _require_strain(stiffness, without, dofs)
+    return int(without.shape[1])
 
 
-def _require_held_by_stiffness(stiffness: Matrix, rows: IntArray, dofs: Sequence[Dof]) -> None:
-    """Refuse DOFs without mass that can move without any force."""
-    block = stiffness[rows][:, rows]
-    diagonal = block.diagonal()
-    named = [dofs[row] for row in rows.tolist()]
-    worst = int(np.argmin(diagonal))
-    is_held = bool(diagonal[worst] > 0)
+def _negative_mass(where: str) -> InputError:
+    return InputError(
+        f"the mass matrix is indefinite: a motion has a negative mass{where}; "
+        "export the mass matrix that the FE program computes modes with"
+    )
+
+
+def _require_strain(stiffness: Matrix, motions: FloatArray, dofs: Sequence[Dof]) -> None:
+    """Refuse motions without mass that need no force."""
+    energies: FloatArray = motions.T @ np.asarray(stiffness @ motions)
+    scale = np.sqrt(np.where(np.diag(energies) > 0, np.diag(energies), 1.0))
+    values, vectors = linalg.eigh(energies / np.outer(scale, scale))
+    if values[0] <= SINGULAR_MASS:
+        loose = np.abs(motions @ (vectors[:, 0] / scale))
+        raise _loose(f", the DOF {dofs[int(np.argmax(loose))].name} among them")
+
+
+def _require_held_by_stiffness(mass: Matrix, stiffness: Matrix, dofs: Sequence[Dof]) -> None:
+    """Refuse a large model in which a motion meets neither mass nor stiffness: both together are then singular."""
+    inertia = mass.diagonal()
+    weight = float(np.median(stiffness.diagonal()[inertia > 0] / inertia[inertia > 0]))
+    together = stiffness + weight * mass
+    diagonal = together.diagonal()
+    is_held = bool((diagonal > 0).all())
     if is_held:
         scale = sparse.diags_array(1 / np.sqrt(diagonal))
-        scaled = sparse.csr_array(scale @ block @ scale)
-        if len(named) <= DENSE_ORDER:
-            smallest, motion = _smallest_eigenpair(scaled)
-            is_held, worst = smallest > SINGULAR_MASS, int(np.argmax(motion))
-        else:
-            is_held = is_positive_definite(_shifted(scaled, -SINGULAR_MASS), _nodes(named))
-    if not is_held:
-        raise InputError(
-            f"DOFs without mass can move without any force, the DOF {named[worst].name} among them: give them a mass "
-            "or a stiffness in the FE program, or hold them"
+        is_held = is_positive_definite(
+            _shifted(sparse.csr_array(scale @ together @ scale), -SINGULAR_MASS), _nodes(dofs)
         )
+    if not is_held:
+        raise _loose("")
+
+
+def _loose(where: str) -> InputError:
+    return InputError(
+        f"motions without mass can take place without any force{where}: give them a mass or a stiffness in the FE "
+        "program, or hold them"
+    )
 
 
 def require_semidefinite(matrix: Matrix, dofs: Sequence[Dof], what: str, *, rounding: float = 0.0) -> None:

@@ -21,7 +21,7 @@ from frf_ipz.numerics.constraints import (
     find_multipliers,
     solve_equations,
 )
-from frf_ipz.numerics.definiteness import massless_rows, require_mass, require_semidefinite, symmetrise
+from frf_ipz.numerics.definiteness import count_massless_motions, require_semidefinite, symmetrise
 from frf_ipz.numerics.held_rows import find_held_rows
 from frf_ipz.numerics.rounding import printed_rounding
 from frf_ipz.unit_systems import SI, UnitSystem
@@ -258,6 +258,8 @@ class ModelMatrices:
         kg, N/m, N s/m and N/m (and their rotational counterparts); the last two are empty where there is none.
     motions : AdmissibleMotions, optional
         Where constraint equations join DOFs.
+    n_massless : int
+        Motions without mass.
     held_dofs : tuple of Dof
         DOFs whose rows were left out.
     supports : mapping of int to str
@@ -276,6 +278,7 @@ class ModelMatrices:
     damping: Matrix
     structural_damping: Matrix
     motions: AdmissibleMotions | None
+    n_massless: int
     held_dofs: tuple[Dof, ...]
     supports: Mapping[int, str]
     rounding: float
@@ -355,11 +358,14 @@ class ModelMatrices:
             held_dofs=free.held_dofs,
             supports=free.supports,
             rounding=rounding,
-            notes=(*notes, *_massless_note(blocks["mass"], motions)),
+            n_massless=0,
+            notes=tuple(notes),
             exported=exported,
         )
-        made._require_structure(errors, allow_negative_stiffness=options.allow_negative_stiffness)
-        return made
+        n_massless = made._count_massless(errors, allow_negative_stiffness=options.allow_negative_stiffness)
+        if n_massless:
+            notes.append(f"{n_massless} motions have no mass: they follow the others statically")
+        return replace(made, n_massless=n_massless, notes=tuple(notes))
 
     def part(self, what: str, matrix: Matrix) -> Matrix:
         """Bring the matrix of a part of the structure to the same rows and units.
@@ -384,22 +390,24 @@ class ModelMatrices:
         kept = self.exported.kept
         return sparse.csr_array(self.exported.block(what, matrix)[kept][:, kept])
 
-    def _require_structure(
+    def _count_massless(
         self, errors: Callable[[str], AbstractContextManager[None]], *, allow_negative_stiffness: bool
-    ) -> None:
+    ) -> int:
+        """Count motions without mass, and require that the matrices are those of a structure."""
         dofs = self.dofs
         mass, stiffness, damping, structural = self.mass, self.stiffness, self.damping, self.structural_damping
         if self.motions is not None:
             mass, stiffness, damping, structural = map(self.motions.reduced, (mass, stiffness, damping, structural))
             dofs = tuple(dofs[row] for row in self.motions.independent.tolist())
         with errors("mass"):
-            require_mass(mass, stiffness, dofs)
+            n_massless = count_massless_motions(mass, stiffness, dofs)
         with errors("stiffness"):
             if not allow_negative_stiffness:
                 require_semidefinite(stiffness, dofs, "stiffness", rounding=self.rounding)
             require_semidefinite(structural, dofs, "imaginary part of the stiffness", rounding=self.rounding)
         with errors("damping"):
             require_semidefinite(damping, dofs, "damping", rounding=printed_rounding(damping.data))
+        return n_massless
 
 
 def _real_and_imaginary(stiffness: Any) -> tuple[Matrix, Matrix | None]:  # noqa: ANN401 - real or complex
@@ -425,8 +433,3 @@ def _without_feigned_couplings(stiffness: Matrix, dofs: Sequence[Dof]) -> Matrix
     is_real = ~is_across | (np.abs(entries.data) > FEIGNED * size[entries.row] * size[entries.col])
     places = (entries.row[is_real], entries.col[is_real])
     return sparse.csr_array(sparse.coo_array((entries.data[is_real], places), shape=stiffness.shape))
-
-
-def _massless_note(mass: Matrix, motions: AdmissibleMotions | None) -> list[str]:
-    count = int(massless_rows(mass if motions is None else motions.reduced(mass)).sum())
-    return [f"{count} DOFs have no mass: they follow the others statically"] if count else []

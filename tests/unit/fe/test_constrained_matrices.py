@@ -118,7 +118,7 @@ def test_a_loose_dof_without_mass_is_named():
     stiffness = np.array([[2.0, -1.0, -1.0], [-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
     stiffness = np.pad(stiffness, (0, 2))
     stiffness[3:, 3:] = [[1.0, -1.0], [-1.0, 1.0]]
-    with pytest.raises(InputError, match=r"can move without any force, the DOF [45]:x"):
+    with pytest.raises(InputError, match=r"without any force, the DOF [45]:x"):
         StructuralModel.from_matrices(
             np.diag([1.0, 1, 1, 0, 0]), stiffness, dofs=[f"{node}:x" for node in (1, 2, 3, 4, 5)]
         )
