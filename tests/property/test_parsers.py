@@ -16,7 +16,8 @@ from data_sets import data_set
 from fe_models import BEAM_TEXT, LUMPED_TEXT
 from frf_ipz.errors import FrfIpzError
 from frf_ipz.fe.matrices.dof_table import read_dof_table
-from frf_ipz.fe.matrices.matrix_market import read_matrix_market
+from frf_ipz.fe.matrices.formats.matrix_market import read_matrix_market
+from frf_ipz.fe.matrices.stored import MatrixRequest
 from frf_ipz.fe.model_file import read_model
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.formats.registry import open_recording
@@ -71,11 +72,11 @@ PARSERS = {
     "frf.uff": (universal(4), frf_ipz.read_frfs),
     "general.mtx": (
         f"%%MatrixMarket matrix coordinate real symmetric\n% K\n{TRIPLES}",
-        lambda path: read_matrix_market(path, 3, "dofs.csv"),
+        lambda path: read_matrix_market(MatrixRequest(path=path, what="stiffness", order=3, ordered_by="dofs.csv")),
     ),
     "array.mtx": (
         "%%MatrixMarket matrix array real general\n3 3\n" + "2.0\n-1.0\n0.0\n" * 3,
-        lambda path: read_matrix_market(path, 3, "dofs.csv"),
+        lambda path: read_matrix_market(MatrixRequest(path=path, what="stiffness", order=3, ordered_by="dofs.csv")),
     ),
     "dofs.csv": (DOFS, read_dof_table),
     "test.toml": (TEST, read_test),

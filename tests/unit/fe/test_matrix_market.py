@@ -9,8 +9,9 @@ from numpy.testing import assert_array_equal
 from scipy import io, sparse
 
 from frf_ipz.errors import FileFormatError
-from frf_ipz.fe.matrices import matrix_market
-from frf_ipz.fe.matrices.matrix_market import read_matrix_market
+from frf_ipz.fe.matrices.formats import matrix_market
+from frf_ipz.fe.matrices.formats.matrix_market import read_matrix_market
+from frf_ipz.fe.matrices.stored import MatrixRequest
 
 REAL = "%%MatrixMarket matrix coordinate real symmetric\n"
 GENERAL = "%%MatrixMarket matrix coordinate real general\n"
@@ -25,7 +26,7 @@ COMPLEX = LOWER.replace("\n", " 0.0\n")
 def read(folder, text, order=3):
     path = folder / "K.mtx"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return read_matrix_market(path, order, "dofs.csv")
+    return read_matrix_market(MatrixRequest(path=path, what="stiffness", order=order, ordered_by="dofs.csv"))
 
 
 def refused(folder, text, order=3):
@@ -146,11 +147,11 @@ HEADERS = {
     "pattern": (REAL.replace("real", "pattern") + "3 3 1\n1 1\n", ["pattern"]),
     "fractions under integer": (REAL.replace("real", "integer") + "3 3 5\n" + LOWER, ["fractions"]),
     "skew": (REAL.replace("symmetric", "skew-symmetric") + "3 3 1\n2 1 -800\n", ["gyroscopic"]),
-    "loss factor": (
-        REAL.replace("real", "complex")
+    "hermitian with imaginary parts": (
+        REAL.replace("real symmetric", "complex hermitian")
         + "3 3 5\n"
         + "\n".join(f"{line} {0.02 * float(line.split()[2])}" for line in LOWER.splitlines()),
-        ["imaginary parts 0.02 times", "modal_ratio = 0.01"],
+        ["hermitian", "is symmetric"],
     ),
     "triangles that differ": (
         REAL + "3 3 7\n" + BOTH.replace("1 2 -800", "1 2 -900"),
@@ -180,5 +181,7 @@ def test_a_large_file_is_read_by_scipy_alone(tmp_path, monkeypatch):
     matrix = half + half.T
     io.mmwrite(tmp_path / "K.mtx", sparse.coo_array(matrix), symmetry="symmetric", precision=17)
     monkeypatch.setattr(matrix_market, "_parse_lines", None)
-    read_back = read_matrix_market(tmp_path / "K.mtx", 400, "dofs.csv").matrix
+    read_back = read_matrix_market(
+        MatrixRequest(path=tmp_path / "K.mtx", what="stiffness", order=400, ordered_by="dofs.csv")
+    ).matrix
     assert_array_equal(read_back.toarray(), matrix.toarray())

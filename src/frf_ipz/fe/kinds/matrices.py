@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.arrays import IntArray
+from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.dofs import GENERALISED, Dof
 from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.fe.assembly import stated_damping
-from frf_ipz.fe.matrices.dof_table import DofTable, read_dof_table
-from frf_ipz.fe.matrices.matrix_market import MatrixFile, read_matrix_market
+from frf_ipz.fe.matrices.node_positions import read_positions
+from frf_ipz.fe.matrices.registry import read_matrix
+from frf_ipz.fe.matrices.row_tables import read_rows
+from frf_ipz.fe.matrices.stored import MatrixRequest, StoredMatrix
 from frf_ipz.fe.model_options import DampingSection, ModelSection
 from frf_ipz.numerics.structural_matrices import MatrixOptions, ModelMatrices
 from frf_ipz.option_types import Name
@@ -21,11 +24,10 @@ from frf_ipz.structure import Part, StructuralModel, drawn_geometry
 from frf_ipz.toml_files import STRICT
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from frf_ipz.arrays import Matrix
-    from frf_ipz.dofs import Dof
 
 KIND = "matrices"
 SUM_TOLERANCE = 1e-6  # of a diagonal entry: rounding of printed groups may add up to that
@@ -40,7 +42,7 @@ class MatrixGroup:
     name : str
         As the user calls it.
     stiffness : str
-        Matrix Market file, of the order of the whole.
+        File of a matrix, of the order of the whole.
     mass : str, optional
         The same for its mass.
     """
@@ -53,17 +55,39 @@ class MatrixGroup:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MatrixNames:
+    """``variables = { mass, stiffness, damping }``: what matrices are called in files that hold several.
+
+    Parameters
+    ----------
+    mass, stiffness, damping : str, optional
+        Names; by default the usual ones, such as ``M``, ``MAA`` or ``mass``.
+    """
+
+    __pydantic_config__ = STRICT
+
+    mass: str = ""
+    stiffness: str = ""
+    damping: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MatricesOptions:
     """``[matrices]``: files with the matrices and with what their rows are.
 
     Parameters
     ----------
     mass, stiffness : str
-        Matrix Market file.
-    dofs : str
-        CSV file that names the rows.
+        File of a matrix, in any format that is read; one file may hold both.
+    dofs : str, optional
+        File that names the rows: CSV, CalculiX's ``.dof`` or Ansys's ``.mapping``. Not needed where the files of the
+        matrices name them.
     damping : str, optional
-        Matrix Market file of viscous damping.
+        File of viscous damping.
+    nodes : str, optional
+        Where nodes are, if the rows' file does not say it: CSV ``node,x,y,z``, or the deck (``.inp``, ``.bdf``).
+    variables : MatrixNames, optional
+        What the matrices are called in files that hold several.
     group : tuple of MatrixGroup
         Additive parts of the matrices, which may be softer, stiffer, lighter or heavier than they should be.
     held : str
@@ -77,8 +101,10 @@ class MatricesOptions:
 
     mass: Name
     stiffness: Name
-    dofs: Name
+    dofs: Name | None = None
     damping: Name | None = None
+    nodes: Name | None = None
+    variables: MatrixNames | None = None
     group: tuple[MatrixGroup, ...] = ()
     held: Literal["auto", "keep"] = "auto"
     allow_negative_stiffness: bool = False
@@ -124,9 +150,9 @@ def files(file: MatricesFile, path: Path) -> tuple[Path, ...]:
         Matrices and the table of DOFs.
     """
     options = file.matrices
-    names = [options.mass, options.stiffness, options.damping, options.dofs]
+    names = [options.mass, options.stiffness, options.damping, options.dofs, options.nodes]
     names += [name for group in options.group for name in (group.stiffness, group.mass)]
-    return tuple(path.parent / name for name in names if name is not None)
+    return tuple(dict.fromkeys(path.parent / name for name in names if name is not None))
 
 
 def read(file: MatricesFile, path: Path) -> StructuralModel:
@@ -152,27 +178,27 @@ def read(file: MatricesFile, path: Path) -> StructuralModel:
         stiffness or damping is indefinite, or groups add up to more than the whole.
     """
     options = file.matrices
-    files = _Files(path=path, table=read_dof_table(path.parent / options.dofs), options=options)
-    names = {"mass": options.mass, "stiffness": options.stiffness}
+    names = {"stiffness": options.stiffness, "mass": options.mass}
     if options.damping is not None:
         names["damping"] = options.damping
-    whole = {what: files.read(name) for what, name in names.items()}
-    table, units = files.table, file.model.system
+    files = _Files.read(path, options, names)
+    units = file.model.system
     matrices = ModelMatrices.of(
-        {what: matrix.matrix for what, matrix in whole.items()},
-        table.dofs,
+        {what: stored.matrix for what, stored in files.whole.items()},
+        files.dofs,
         MatrixOptions(
             held=options.held,
             units=units,
             allow_negative_stiffness=options.allow_negative_stiffness,
-            axes=table.axes,
+            axes=files.axes,
         ),
         errors=lambda what: errors_of_file(path.parent / names.get(what, options.stiffness)),
     )
+    nodes, positions, is_schematic = files.places()
     model = StructuralModel.from_model_matrices(
         matrices,
         name=file.model.name,
-        geometry=drawn_geometry(matrices, table.nodes, units.length_m * table.coordinates),
+        geometry=drawn_geometry(matrices, nodes, units.length_m * positions, is_schematic=is_schematic),
         modal_damping=np.zeros(0),
         allow_negative_stiffness=options.allow_negative_stiffness,
     )
@@ -182,25 +208,87 @@ def read(file: MatricesFile, path: Path) -> StructuralModel:
         modal_damping=modal_damping,
         damping_all=sparse.csr_array(damping + model.damping),
         parts=_groups(files, matrices),
-        notes=(*(note for matrix in whole.values() for note in matrix.notes), *model.notes),
+        notes=(*(note for what in ("mass", "stiffness", "damping") for note in files.notes(what)), *model.notes),
         source=file,
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Files:
-    """The files of a model."""
+    """The files of a model: its matrices, with all rows in one order."""
 
     path: Path
-    table: DofTable
     options: MatricesOptions
+    dofs: tuple[Dof, ...]
+    ordered_by: str
+    axes: Mapping[int, FloatArray]
+    positions: Mapping[int, Sequence[float]]
+    whole: Mapping[str, StoredMatrix]
 
-    def read(self, name: str) -> MatrixFile:
-        return read_matrix_market(self.path.parent / name, len(self.table.dofs), self.options.dofs)
+    @classmethod
+    def read(cls, path: Path, options: MatricesOptions, names: Mapping[str, str]) -> _Files:
+        table = read_rows(path.parent / options.dofs) if options.dofs is not None else None
+        ordered_by = options.dofs or options.stiffness
+        order = None if table is None else len(table.dofs)
+        whole: dict[str, StoredMatrix] = {}
+        dofs = () if table is None else table.dofs
+        positions = dict(table.positions) if table is not None else {}
+        for what, name in names.items():
+            stored = _read_one(path, what, name, options, order=order, ordered_by=ordered_by)
+            if not dofs:
+                if stored.dofs is None:
+                    raise FileFormatError(
+                        path, f"{name} does not say what its rows are; name a file that does: dofs = \"dofs.csv\"",
+                        where="key 'matrices.dofs'",
+                    )  # fmt: skip
+                dofs = stored.dofs
+            positions = {**stored.positions, **positions}
+            whole[what] = stored.in_rows(dofs, path.parent / name, ordered_by)
+        if options.nodes is not None:
+            positions = dict(read_positions(path.parent / options.nodes))
+        axes = {} if table is None else table.axes
+        return cls(
+            path=path, options=options, dofs=dofs, ordered_by=ordered_by, axes=axes, positions=positions, whole=whole
+        )
+
+    def notes(self, what: str) -> tuple[str, ...]:
+        return self.whole[what].notes if what in self.whole else ()
+
+    def places(self) -> tuple[IntArray, FloatArray, bool]:
+        """Nodes, ascending, their positions, and whether these are none: then nodes stand in a row."""
+        nodes = sorted({dof.node for dof in self.dofs})
+        structural = {dof.node for dof in self.dofs if dof.direction != GENERALISED}
+        missing = [node for node in nodes if node in structural and node not in self.positions]
+        if missing and self.options.nodes is not None:
+            raise FileFormatError(
+                self.path.parent / self.options.nodes, f"has no position of node {missing[0]}, which the matrices name"
+            )
+        if missing:
+            return np.array(nodes), np.array([(float(place), 0.0, 0.0) for place in range(len(nodes))]), True
+        places = [tuple(self.positions.get(node, (0.0, 0.0, 0.0))) for node in nodes]
+        return np.array(nodes), np.array(places, float), False
 
     def part(self, matrices: ModelMatrices, what: str, name: str) -> Matrix:
+        stored = _read_one(
+            self.path, what, name, self.options, order=len(self.dofs), ordered_by=self.ordered_by, is_part=True
+        )
         with errors_of_file(self.path.parent / name):
-            return matrices.part(what, self.read(name).matrix)
+            return matrices.part(what, stored.in_rows(self.dofs, self.path.parent / name, self.ordered_by).matrix)
+
+
+def _read_one(
+    path: Path,
+    what: str,
+    name: str,
+    options: MatricesOptions,
+    *,
+    order: int | None,
+    ordered_by: str,
+    is_part: bool = False,
+) -> StoredMatrix:
+    variable = "" if is_part or options.variables is None else getattr(options.variables, what)
+    request = MatrixRequest(path=path.parent / name, what=what, variable=variable, order=order, ordered_by=ordered_by)
+    return read_matrix(request)
 
 
 def _groups(files: _Files, matrices: ModelMatrices) -> tuple[Part, ...]:

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.arrays import FloatArray
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
 from frf_ipz.errors import FileFormatError, did_you_mean, errors_of_file
 from frf_ipz.input_files import read_text
 from frf_ipz.text_numbers import parse_number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
 COLUMNS = ("node", "direction", "x_m", "y_m", "z_m")
@@ -38,17 +38,14 @@ class DofTable:
     ----------
     dofs : tuple of Dof
         One a row.
-    nodes : (n_nodes,) int array
-        Node numbers, ascending.
-    coordinates : (n_nodes, 3) array
-        Their positions, in the unit of the model's length.
+    positions : mapping of int to (3,) sequence
+        Where nodes are, as far as the file says it, in the unit of the model's length.
     axes : mapping of int to (3, 3) array
         Nodes with axes of their own, which are the rows of the array.
     """
 
     dofs: tuple[Dof, ...]
-    nodes: IntArray
-    coordinates: FloatArray
+    positions: Mapping[int, Sequence[float]]
     axes: Mapping[int, FloatArray]
 
 
@@ -102,13 +99,7 @@ def read_dof_table(path: Path) -> DofTable:
             raise FileFormatError(path, f"node {dof.node} has other coordinates in an earlier line", where=where)
     if not lines:
         raise FileFormatError(path, "names no DOF; one row a row of the matrices is needed")
-    nodes = sorted({dof.node for dof in lines})
-    return DofTable(
-        dofs=tuple(lines),
-        nodes=np.array(nodes),
-        coordinates=np.array([positions.get(node, NOWHERE) for node in nodes], dtype=float),
-        axes=axes,
-    )
+    return DofTable(dofs=tuple(lines), positions=positions, axes=axes)
 
 
 def _csv_rows(lines: list[str], separator: str, path: Path) -> Iterator[tuple[int, list[str]]]:

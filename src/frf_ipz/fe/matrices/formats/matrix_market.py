@@ -19,6 +19,7 @@ from scipy import io, sparse
 
 from frf_ipz.arrays import ComplexArray, IntArray
 from frf_ipz.errors import FileFormatError, did_you_mean
+from frf_ipz.fe.matrices.stored import MatrixFormat, MatrixRequest, StoredMatrix
 from frf_ipz.input_files import MISSING, read_bytes
 from frf_ipz.numerics.definiteness import SYMMETRY_TOLERANCE
 from frf_ipz.text_numbers import NumberError, parse_number
@@ -51,22 +52,6 @@ TO_E = bytes.maketrans(b"dDqQ", b"EEEE")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class MatrixFile:
-    """What stands in a file.
-
-    Parameters
-    ----------
-    matrix : (n, n) sparse array
-        Both triangles, in the unit of the file; not yet made symmetric.
-    notes : tuple of str
-        How it was taken, where the file leaves that open.
-    """
-
-    matrix: Matrix
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Text:
     """A file's lines: the words of the first, the size, and the bytes of the entries without comments."""
 
@@ -83,33 +68,33 @@ class _Text:
         return 2 if self.field == "complex" else 1
 
 
-def read_matrix_market(path: Path, order: int, ordered_by: str) -> MatrixFile:
-    """Read a real square matrix.
+def read_matrix_market(request: MatrixRequest) -> StoredMatrix:
+    """Read a square matrix.
 
     Parameters
     ----------
-    path : Path
+    request : MatrixRequest
         The file, in coordinate or array form; plain, or compressed by gzip or bzip2.
-    order : int
-        Required number of rows.
-    ordered_by : str
-        File that names the rows, for messages.
 
     Returns
     -------
-    MatrixFile
+    StoredMatrix
         The matrix with both its triangles, and what is to be said about the file.
 
     Raises
     ------
     FileFormatError
         If there is no such file, it is no Matrix Market file, is not square, of another size or skew-symmetric, holds
-        imaginary parts, or holds anything that is no number, no row or no column: says in which line.
+        imaginary parts without being a stiffness, or holds anything that is no number, no row or no column: says in
+        which line.
     """
-    text = _split(path, _read_plain_bytes(path))
-    _require_order(text, order, ordered_by)
+    text = _split(request.path, _read_plain_bytes(request.path))
+    _require_square(text, request)
     rows, columns, values = _parse_entries(text)
-    return _assemble(text, rows, columns, _real_values(text, values))
+    return _assemble(text, rows, columns, _values(text, values, request.what))
+
+
+FORMAT = MatrixFormat(rank=9, fits=lambda path, head: True, read=read_matrix_market)  # noqa: ARG005 - its message says what is known
 
 
 def _read_plain_bytes(path: Path) -> bytes:
@@ -164,13 +149,14 @@ def _split(path: Path, data: bytes) -> _Text:
     )
 
 
-def _require_order(text: _Text, order: int, ordered_by: str) -> None:
+def _require_square(text: _Text, request: MatrixRequest) -> None:
     rows, columns, *_ = text.size
     if rows != columns:
         raise FileFormatError(text.path, f"is {rows} x {columns}; a square matrix is needed")
-    if rows != order:
+    if request.order is not None and rows != request.order:
         raise FileFormatError(
-            text.path, f"is {rows} x {columns}, but {ordered_by} names {order} DOFs; one row a DOF is needed"
+            text.path,
+            f"is {rows} x {columns}, but {request.ordered_by} names {request.order} DOFs; one row a DOF is needed",
         )
 
 
@@ -292,25 +278,26 @@ def _refuse(text: _Text, line: int, problem: str) -> NoReturn:
     raise FileFormatError(text.path, problem, where=f"line {line}")
 
 
-def _real_values(text: _Text, values: ComplexArray | FloatArray) -> FloatArray:
+def _values(text: _Text, values: ComplexArray | FloatArray, what: str) -> ComplexArray | FloatArray:
+    """Real values, or complex ones of a stiffness."""
     if "integer" in text.field and (values != np.rint(values)).any():
         raise FileFormatError(text.path, "holds fractions, but its first line says integer; write real there")
     if not np.iscomplexobj(values) or not values.imag.any():
         return np.asarray(values.real, np.float64)
-    real, imaginary = values.real, values.imag
-    size = float(np.abs(real).sum())
-    if not size:
+    if not values.real.any():
         raise FileFormatError(text.path, "holds imaginary values only; the real matrix is needed")
-    ratio = float(np.abs(imaginary).sum()) / size
-    raise FileFormatError(
-        text.path,
-        f"holds complex values, with imaginary parts {ratio:.3g} times as large as the real ones: structural damping, "
-        f"K (1 + i eta), where this is a stiffness. Write the real part as a real matrix, and the loss factor eta as "
-        f"damping ratios of half its size: [damping] modal_ratio = {ratio / 2:.3g}",
-    )
+    if text.symmetry == "hermitian":
+        raise FileFormatError(
+            text.path, "says hermitian in its first line; a stiffness with structural damping is symmetric: write that"
+        )
+    if what != "stiffness":
+        raise FileFormatError(
+            text.path, f"holds complex values; only a stiffness can, K (1 + i eta): write the {what} as a real matrix"
+        )
+    return values
 
 
-def _assemble(text: _Text, rows: IntArray, columns: IntArray, values: FloatArray) -> MatrixFile:
+def _assemble(text: _Text, rows: IntArray, columns: IntArray, values: ComplexArray | FloatArray) -> StoredMatrix:
     order = text.size[0]
     entries: Any = sparse.coo_array((values, (rows, columns)), shape=(order, order))
     matrix: Matrix = sparse.csr_array(entries)
@@ -329,7 +316,7 @@ def _assemble(text: _Text, rows: IntArray, columns: IntArray, values: FloatArray
     has_both = bool(upper.nnz and lower.nnz)
     if text.symmetry == "general":
         if has_both or not matrix.nnz or not (upper.nnz or lower.nnz):
-            return MatrixFile(matrix=matrix, notes=tuple(notes))
+            return StoredMatrix(matrix=matrix, notes=tuple(notes))
         side = "upper" if upper.nnz else "lower"
         notes.append(
             f"{text.path.name}: only the {side} triangle stands there, though its first line says general; it is taken "
@@ -340,7 +327,7 @@ def _assemble(text: _Text, rows: IntArray, columns: IntArray, values: FloatArray
         notes += [note] if note else []
     off_diagonal = upper + lower
     full: Any = off_diagonal + off_diagonal.T + sparse.diags_array(matrix.diagonal())
-    return MatrixFile(matrix=sparse.csr_array(full), notes=tuple(notes))
+    return StoredMatrix(matrix=sparse.csr_array(full), notes=tuple(notes))
 
 
 def _without_twins(text: _Text, upper: Matrix, lower: Matrix) -> tuple[Matrix, str]:

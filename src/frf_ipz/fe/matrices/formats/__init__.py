@@ -1,0 +1,1 @@
+"""Formats of matrices: each module with a ``FORMAT`` is one."""

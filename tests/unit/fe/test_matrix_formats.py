@@ -1,0 +1,243 @@
+"""FE matrices in the formats of other programs, each written by another library or by hand."""
+
+import shutil
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy import io, sparse
+
+from calculix_models import SHELL, SOLID, run_calculix
+from fe_models import beam, export
+from frf_ipz.errors import FileFormatError
+from frf_ipz.fe.eigen import solve_modes
+from frf_ipz.fe.matrices.registry import recognises
+from frf_ipz.fe.model_file import model_files, read_model
+
+ROUNDING = 1e-12
+DOFS = "node,direction,x_m,y_m,z_m\n1,x,0,0,0\n2,x,0.1,0,0\n3,x,0.2,0,0\n"
+MASS = np.diag([2.0, 1.0, 3.0])
+STIFFNESS = np.array([[3e4, -1e4, 0.0], [-1e4, 5e4, -4e4], [0.0, -4e4, 4e4]])
+EXPECTED = np.sqrt(np.linalg.eigvals(np.linalg.solve(MASS, STIFFNESS)).real) / (2 * np.pi)
+EXPECTED.sort()
+
+
+def model_toml(folder, mass, stiffness, *further, dofs='dofs = "dofs.csv"'):
+    text = f'[model]\nkind = "matrices"\n[matrices]\nmass = "{mass}"\nstiffness = "{stiffness}"\n{dofs}\n'
+    (folder / "model.toml").write_text(text + "\n".join(further) + "\n", encoding="utf-8")
+    if dofs and not (folder / "dofs.csv").exists():
+        (folder / "dofs.csv").write_text(DOFS, encoding="utf-8")
+    return folder / "model.toml"
+
+
+def frequencies(path):
+    return solve_modes(read_model(path)).natural_frequency_hz
+
+
+def hdf5(path, arrays, *, sparse_too):
+    """A MATLAB file of version 7.3, as MATLAB lays it out: transposed, sparse ones in parts."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, array in arrays.items():
+            if sparse_too:
+                columns = sparse.csc_array(array)
+                group = file.create_group(name)
+                group.attrs["MATLAB_sparse"] = np.uint64(array.shape[0])
+                group["data"], group["ir"], group["jc"] = columns.data, columns.indices, columns.indptr
+            else:
+                file[name] = array.T
+    with path.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file".ljust(512, b"\0"))
+
+
+@pytest.mark.parametrize("form", ["csr", "csc", "coo", "dense", "named", "npy"])
+def test_numpy_files(tmp_path, form):
+    for name, matrix in (("M", MASS), ("K", STIFFNESS)):
+        if form == "dense":
+            np.savez_compressed(tmp_path / f"{name}.npz", something=matrix)
+        elif form == "named":
+            np.savez(tmp_path / f"{name}.npz", K=STIFFNESS, M=MASS, eta=np.zeros((2, 2)))
+        elif form == "npy":
+            np.save(tmp_path / f"{name}.npy", matrix)
+        else:
+            sparse.save_npz(tmp_path / f"{name}.npz", sparse.coo_array(matrix).asformat(form))
+    suffix = "npy" if form == "npy" else "npz"
+    assert_allclose(frequencies(model_toml(tmp_path, f"M.{suffix}", f"K.{suffix}")), EXPECTED, rtol=ROUNDING)
+
+
+@pytest.mark.parametrize("version", ["4", "5", "5 sparse", "5 in a structure", "7.3", "7.3 sparse"])
+def test_matlab_files(tmp_path, version):
+    path = tmp_path / "fem.mat"
+    arrays = {"K": STIFFNESS, "M": MASS, "unused": np.zeros((3, 7))}
+    if version == "5 sparse":
+        io.savemat(path, {name: sparse.csc_array(array) for name, array in arrays.items()}, do_compression=True)
+    elif version == "5 in a structure":
+        io.savemat(path, {"fem": {"K": sparse.csc_array(STIFFNESS), "E": MASS}})
+    elif version in {"4", "5"}:
+        io.savemat(path, arrays, format=version)
+    else:
+        hdf5(path, arrays, sparse_too="sparse" in version)
+    further = ['variables = { mass = "E" }'] if "structure" in version else []
+    assert_allclose(frequencies(model_toml(tmp_path, path.name, path.name, *further)), EXPECTED, rtol=ROUNDING)
+    assert recognises(path)
+
+
+def test_a_file_may_name_its_rows(tmp_path):
+    labels = np.array(["1:x", "2:x", "3:x"])
+    places = [[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]]
+    np.savez(tmp_path / "fem.npz", K=STIFFNESS, M=MASS, dofs=labels, coordinates=places)
+    io.savemat(tmp_path / "fem.mat", {"K": STIFFNESS, "M": MASS, "dofs": [[1, 1], [2, 1], [3, 1]]})
+    for name, is_placed in (("fem.npz", True), ("fem.mat", False)):
+        model = read_model(model_toml(tmp_path, name, name, dofs=""))
+        assert [dof.name for dof in model.dofs] == ["1:x", "2:x", "3:x"]
+        assert model.geometry.is_schematic is not is_placed
+        if is_placed:
+            assert_allclose(model.geometry.coordinates_m[:, 0], [0, 0.1, 0.2])
+
+
+def triplets(matrix, *, separator=" ", lower=True):
+    rows, columns = np.nonzero(np.tril(matrix) if lower else matrix)
+    return "".join(
+        f"{i + 1}{separator}{j + 1}{separator}{matrix[i, j]:.16e}\n" for i, j in zip(rows, columns, strict=True)
+    )
+
+
+def test_calculix_writes_rows_columns_values_and_a_table_of_dofs(tmp_path):
+    (tmp_path / "job.sti").write_text(triplets(STIFFNESS))
+    (tmp_path / "job.mas").write_text(triplets(MASS))
+    (tmp_path / "job.dof").write_text("1.1\n2.1\n3.1\n")
+    (tmp_path / "job.inp").write_text(
+        "** a deck\n*NODE, NSET=ALL\n1, 0., 0., 0.\n2, 100.,0,0\n3, 200.\n*ELEMENT\n1, 2\n"
+    )
+    path = model_toml(tmp_path, "job.mas", "job.sti", 'nodes = "job.inp"', dofs='dofs = "job.dof"')
+    model = read_model(path)
+    assert_allclose(solve_modes(model).natural_frequency_hz, EXPECTED, rtol=ROUNDING)
+    assert_allclose(model.geometry.coordinates_m[:, 0], [0, 100, 200])
+    assert tmp_path / "job.inp" in model_files(path)
+
+
+@pytest.mark.parametrize("kind", ["matrix input", "both triangles", "coordinate"])
+def test_abaqus_writes_labels_or_coordinates(tmp_path, kind):
+    for name, matrix in (("STIF2", STIFFNESS), ("MASS2", MASS)):
+        if kind == "coordinate":
+            text = triplets(matrix, separator=", ", lower=False)
+        else:
+            text = "** Abaqus\n*MATRIX, TYPE=STIFFNESS\n" + "".join(
+                f"{i + 1},1,{j + 1},1, {matrix[i, j]:.16e}\n"
+                for i in range(3)
+                for j in range(3)
+                if matrix[i, j] and (kind == "both triangles" or (i + j) % 2 == (i > j) or i == j)
+            )
+        (tmp_path / f"job_{name}.mtx").write_text(text)
+    dofs = 'dofs = "dofs.csv"' if kind == "coordinate" else ""
+    path = model_toml(tmp_path, "job_MASS2.mtx", "job_STIF2.mtx", dofs=dofs)
+    assert_allclose(frequencies(path), EXPECTED, rtol=ROUNDING)
+
+
+def test_multipliers_of_abaqus_have_negative_labels(tmp_path):
+    """Nodes 1 and 3 move alike."""
+    rows = "".join(
+        f"{i + 1},1,{j + 1},1,{STIFFNESS[i, j]:.16e}\n" for i in range(3) for j in range(i + 1) if STIFFNESS[i, j]
+    )
+    (tmp_path / "K.mtx").write_text(rows + "-1,0,1,1,1e6\n-1,0,3,1,-1e6\n")
+    (tmp_path / "M.mtx").write_text("1,1,1,1,2.0\n2,1,2,1,1.0\n3,1,3,1,3.0\n")
+    basis = np.array([[1.0, 0], [0, 1], [1, 0]])
+    squares = np.linalg.eigvals(np.linalg.solve(basis.T @ MASS @ basis, basis.T @ STIFFNESS @ basis)).real
+    path = model_toml(tmp_path, "M.mtx", "K.mtx", dofs="")
+    assert_allclose(frequencies(path), np.sqrt(np.sort(squares)) / (2 * np.pi), rtol=1e-9)
+
+
+def test_matrices_that_name_rows_are_put_in_the_order_of_the_table(tmp_path):
+    (tmp_path / "K.mtx").write_text("1,1,1,1,3e4\n2,1,1,1,-1e4\n2,1,2,1,5e4\n3,1,2,1,-4e4\n3,1,3,1,4e4\n")
+    (tmp_path / "M.mtx").write_text("3,1,3,1,3.0\n2,1,2,1,1.0\n1,1,1,1,2.0\n")
+    (tmp_path / "dofs.csv").write_text("node,direction,x_m,y_m,z_m\n3,x,0.2,0,0\n1,x,0,0,0\n2,x,0.1,0,0\n")
+    model = read_model(model_toml(tmp_path, "M.mtx", "K.mtx"))
+    assert [dof.node for dof in model.dofs] == [3, 1, 2]
+    assert model.mass.diagonal().tolist() == [3, 2, 1]
+    assert_allclose(solve_modes(model).natural_frequency_hz, EXPECTED, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("deck", "name"),
+    [
+        (f"{'GRID':8}{1:8}{'':8}{0.0:8}{0.0:8}{0.0:8}\n{'GRID':8}{2:8}{'':8}{'.1':>8}{0.0:8}\n", "a.bdf"),
+        (f"{'GRID*':8}{1:16}{'':16}{0.0:16}{0.0:16}\n{'*':8}{0.0:16}\nGRID,2,,.1,0.0,0.0\n", "a.dat"),
+        ("node,x,y,z\n1,0,0,0\n2,1e-1,0,0\n", "a.csv"),
+        ("*Node\n1,0,0,0\n2,1D-1,0,0\n", "a.inp"),
+    ],
+)  # fmt: skip
+def test_positions_come_from_decks(tmp_path, deck, name):
+    text = deck + {"a.bdf": "GRID           3              .2\n", "a.dat": "GRID,3,,.2\n"}.get(name, "3,0.2,0,0\n")
+    (tmp_path / name).write_text(text)
+    (tmp_path / "job.dof").write_text("1.1\n2.1\n3.1\n")
+    np.savez(tmp_path / "fem.npz", K=STIFFNESS, M=MASS)
+    path = model_toml(tmp_path, "fem.npz", "fem.npz", f'nodes = "{name}"', dofs='dofs = "job.dof"')
+    assert_allclose(read_model(path).geometry.coordinates_m, [[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]])
+
+
+REFUSED = {
+    "several matrices": (lambda f: np.savez(f / "K.npz", A=MASS, B=MASS), "K.npz", ["A, B", "variables"]),
+    "no matrix": (lambda f: np.savez(f / "K.npz", A=np.zeros(3)), "K.npz", ["no square matrix"]),
+    "another order": (lambda f: np.savez(f / "K.npz", K=np.eye(4)), "K.npz", ["4 x 4", "dofs.csv names 3"]),
+    "pickled": (lambda f: np.savez(f / "K.npz", K=np.array([{}], object)), "K.npz", ["pickled"]),
+    "not finite": (lambda f: np.savez(f / "K.npz", K=np.full((3, 3), np.nan)), "K.npz", ["not finite"]),
+    "no archive": (lambda f: (f / "K.npz").write_bytes(b"PK\x03\x04 nothing"), "K.npz", ["NumPy"]),
+    "places outside": (
+        lambda f: np.savez(
+            f / "K.npz", format="csr", shape=[3, 3], data=np.ones(3), indices=[0, 1, 90], indptr=[0, 1, 2, 3]
+        ),
+        "K.npz",
+        ["NumPy"],
+    ),
+    "no MATLAB file": (lambda f: (f / "K.mat").write_bytes(b"MATLAB 5.0 MAT-file nothing"), "K.mat", ["MAT"]),
+    "no HDF5 file": (lambda f: (f / "K.mat").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(99)), "K.mat", ["7.3"]),
+    "a word among numbers": (
+        lambda f: (f / "K.sti").write_text("1 1 3e4\n1 2 x\n"),
+        "K.sti",
+        ["line 2", "'x'"],
+    ),
+    "columns that change": (lambda f: (f / "K.sti").write_text("1 1 3e4\n1 2\n"), "K.sti", ["line 2", "2 columns"]),
+    "row 0": (lambda f: (f / "K.sti").write_text("0 0 3e4\n"), "K.sti", ["count from 1"]),
+    "a row too many": (lambda f: (f / "K.sti").write_text("9 9 3e4\n"), "K.sti", ["9 x 9"]),
+    "DOFs of no table": (lambda f: (f / "K.sti").write_text("7,1,7,1,3e4\n"), "K.sti", ["7:x", "dofs.csv"]),
+    "nothing": (lambda f: (f / "K.sti").write_text("* only this\n"), "K.sti", ["no entry"]),
+}
+
+
+@pytest.mark.parametrize(("write", "name", "words"), REFUSED.values(), ids=REFUSED)
+def test_what_is_no_matrix_is_refused_by_name(tmp_path, write, name, words):
+    np.savez(tmp_path / "M.npz", M=MASS)
+    write(tmp_path)
+    with pytest.raises(FileFormatError) as caught:
+        read_model(model_toml(tmp_path, "M.npz", name))
+    message = str(caught.value)
+    assert name in message
+    for word in words:
+        assert word in message
+
+
+def test_rows_have_to_be_named_somewhere(tmp_path):
+    np.savez(tmp_path / "fem.npz", K=STIFFNESS, M=MASS)
+    with pytest.raises(FileFormatError, match=r"model\.toml, key 'matrices\.dofs'.*fem\.npz does not say"):
+        read_model(model_toml(tmp_path, "fem.npz", "fem.npz", dofs=""))
+
+
+def test_groups_come_in_any_format(tmp_path):
+    path = export(tmp_path, beam(left="clamped", elements=4))
+    sparse.save_npz(tmp_path / "K_part.npz", sparse.csr_array(0.3 * read_model(path).stiffness))
+    path.write_text(path.read_text() + '[[matrices.group]]\nname = "part"\nstiffness = "K_part.npz"\n')
+    (part,) = read_model(path).parts
+    assert part.stiffness.shape == (8, 8)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (Debian's calculix-ccx) is not installed")
+@pytest.mark.parametrize("deck", [SOLID, SHELL], ids=["solid", "shell"])
+def test_frequencies_of_calculix_are_its_own(tmp_path, deck):
+    expected = run_calculix(tmp_path, deck)
+    nodes = 'nodes = "job.inp"' if deck is SOLID else ""
+    path = model_toml(tmp_path, "job.mas", "job.sti", nodes, dofs='dofs = "job.dof"')
+    path.write_text(path.read_text().replace("[model]\n", '[model]\nunits = "mm-t-s"\n'))
+    model = read_model(path)
+    assert_allclose(solve_modes(model, n_modes=8).natural_frequency_hz, expected, rtol=1e-6)
+    if deck is SOLID:
+        assert_allclose(np.ptp(model.geometry.coordinates_m, axis=0), [0.05, 0.01, 0.004])
