@@ -64,6 +64,9 @@ from .fe.model_file import read_model as read_model
 from .fe.reduction.options import ReduceOptions as ReduceOptions
 from .fe.reduction.reduce import reduce_model as reduce_model
 from .fe.response import compute_frfs as compute_frfs
+from .fleet.results import FleetResults as FleetResults
+from .fleet.results import open_fleet as open_fleet
+from .fleet.run import run_fleet as run_fleet
 from .frf import FrfLabel as FrfLabel
 from .frf import FrfSet as FrfSet
 from .identification.fit import fit_modes as fit_modes

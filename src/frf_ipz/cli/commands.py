@@ -88,6 +88,25 @@ for _stage in HELP:
 
 
 @app.command()
+def fleet(
+    fleet: Annotated[Path, typer.Argument(metavar="FLEET", help="The fleet.toml: machines, one model, one pipeline.")],
+    out: OutOption = Path("results"),
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", "-j", min=1, metavar="N", help="Processes; by cores and memory by default.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Of a Dask cluster that does the work.")
+    ] = None,
+    only: Annotated[str, typer.Option("--only", metavar="ID,ID", help="Run these machines only.")] = "",
+    quiet: QuietOption = False,
+) -> None:
+    """Run many machines of one kind, and compare them: fleet.parquet, fleet_poles.parquet, fleet.html and others."""
+    from frf_ipz.cli.terminal import run_fleet_with_progress
+
+    run_fleet_with_progress(fleet, out, jobs=jobs, scheduler=scheduler, only=only, quiet=quiet)
+
+
+@app.command()
 def check(pipeline: PipelineArgument) -> None:
     """Validate test, model and pipeline, draw the set-up, run nothing."""
     from frf_ipz.pipeline.check.setup import describe_setup

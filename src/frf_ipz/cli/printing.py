@@ -36,6 +36,17 @@ def say_error(text: str) -> None:
     print(f"frf-ipz: {one_line(text)}", file=sys.stderr, flush=True)
 
 
+def say_progress(text: str) -> None:
+    """Print how far a command is, where there is no terminal to draw on.
+
+    Parameters
+    ----------
+    text : str
+        One line.
+    """
+    print(one_line(text), file=sys.stderr, flush=True)
+
+
 def guard_streams() -> None:
     """Let nothing else reach the terminal as it is: neither warnings of libraries nor faults of the program."""
     for stream in (sys.stdout, sys.stderr):  # a console or a pipe may know fewer letters than a user's names have

@@ -1,15 +1,12 @@
-"""Progress and summary on a terminal."""
+"""Progress and summary on a terminal, of runs and of fleets."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
 from frf_ipz.cli.printing import say
+from frf_ipz.cli.progress_display import showing_progress
 from frf_ipz.pipeline.run import run_pipeline
-from frf_ipz.visible_text import one_line
 
 
 def run_with_progress(pipeline: Path, out: Path, *, until: str, diagnosing: bool | None, quiet: bool) -> None:
@@ -33,14 +30,41 @@ def run_with_progress(pipeline: Path, out: Path, *, until: str, diagnosing: bool
     FrfIpzError
         If the run cannot be done.
     """
-    console = Console(stderr=True, quiet=quiet, highlight=False)
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bar:
-        task = bar.add_task("reading", total=1.0)
-
-        def show(fraction: float, text: str) -> None:
-            bar.update(task, completed=fraction, description=one_line(text)[:60].ljust(60))
-
+    with showing_progress(quiet=quiet) as show:
         run = run_pipeline(pipeline, out, until=until, diagnosing=diagnosing, progress=show)
     if not quiet:
         say(run.summary())
+
+
+def run_fleet_with_progress(
+    fleet: Path, out: Path, *, jobs: int | None, scheduler: str | None, only: str, quiet: bool
+) -> None:
+    """Run a fleet, show how far it is, and sum up.
+
+    Parameters
+    ----------
+    fleet : Path
+        The fleet file.
+    out : Path
+        The fleet's folder.
+    jobs : int, optional
+        Number of processes.
+    scheduler : str, optional
+        Address of the scheduler of a Dask cluster.
+    only : str
+        Ids of the machines to run, with commas between them; empty for all.
+    quiet : bool
+        Show nothing.
+
+    Raises
+    ------
+    FrfIpzError
+        If the fleet cannot be run.
+    """
+    from frf_ipz.fleet.run import run_fleet
+
+    machines = [name.strip() for name in only.split(",") if name.strip()]
+    with showing_progress(quiet=quiet) as show:
+        results = run_fleet(fleet, out, jobs=jobs, scheduler=scheduler, only=machines, progress=show)
+    if not quiet:
+        say(results.summary())

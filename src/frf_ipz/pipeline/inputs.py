@@ -15,6 +15,7 @@ from frf_ipz.ingest.estimation.frf_files import read_frfs
 from frf_ipz.input_files import Ledger, digest_file, entering
 from frf_ipz.pipeline.config import StageOptions, read_pipeline
 from frf_ipz.pipeline.sensors import without_sensors
+from frf_ipz.pipeline.shared_model import SharedModel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -59,6 +60,8 @@ class PipelineInputs:
         Its name in `digests`.
     ledger : Ledger
         What was in each file: a stage that reads one again must find the same.
+    shared : SharedModel, optional
+        The FE model, where many runs have the same one.
     """
 
     name: str
@@ -75,6 +78,7 @@ class PipelineInputs:
     reference: FrfSet | None = None
     reference_name: str = ""
     ledger: Ledger = field(default_factory=Ledger)
+    shared: SharedModel | None = None
 
     @property
     def model_key(self) -> list[object]:
@@ -100,13 +104,15 @@ class PlacesOfMistakes(TypedDict):
     is_recorded: bool
 
 
-def read_inputs(path: Path) -> PipelineInputs:
+def read_inputs(path: Path, *, shared: SharedModel | None = None) -> PipelineInputs:
     """Read a pipeline file and all that it names.
 
     Parameters
     ----------
     path : Path
         ``pipeline.toml``, or a folder that holds exactly one pipeline.
+    shared : SharedModel, optional
+        The FE model that it names, as it has been read for many runs; it is read here where it is left out.
 
     Returns
     -------
@@ -118,16 +124,16 @@ def read_inputs(path: Path) -> PipelineInputs:
     InputError
         On the first thing that is wrong: which file, which place, what was expected.
     """
-    ledger = Ledger()
+    ledger = Ledger() if shared is None else shared.ledger()
     with entering(ledger):
-        return _read_inputs(path, ledger)
+        return _read_inputs(path, ledger, shared)
 
 
-def _read_inputs(path: Path, ledger: Ledger) -> PipelineInputs:
+def _read_inputs(path: Path, ledger: Ledger, shared: SharedModel | None) -> PipelineInputs:
     pipeline = read_pipeline(path)
     points = _read_points(pipeline)
     test = _read_test(pipeline).with_forces_at(points)
-    fe_model = None if pipeline.model_path is None else _read_model(pipeline.model_path, test, points)
+    fe_model = None if pipeline.model_path is None else _read_model(pipeline.model_path, test, points, shared)
     if fe_model is None and points:
         raise FileFormatError(
             pipeline.path,
@@ -154,6 +160,7 @@ def _read_inputs(path: Path, ledger: Ledger) -> PipelineInputs:
         reference=None if aside is None else read_frfs(aside, quantity=test.labels[0].quantity),
         reference_name="" if aside is None else str(aside),
         ledger=ledger,
+        shared=shared,
     )
 
 
@@ -202,8 +209,8 @@ def _read_points(pipeline: Pipeline) -> tuple[Dof, ...]:
         raise FileFormatError(pipeline.path, str(error), where="key 'predict.points'") from None
 
 
-def _read_model(path: Path, test: VibrationTest, points: Sequence[Dof]) -> StructuralModel:
-    fe_model = read_model(path)
+def _read_model(path: Path, test: VibrationTest, points: Sequence[Dof], shared: SharedModel | None) -> StructuralModel:
+    fe_model = read_model(path) if shared is None or shared.path != path else shared.model
     try:
         return complete_model(fe_model, test, points)
     except InputError as error:

@@ -178,10 +178,25 @@ def page_margins(run: Results) -> str:
     str
         A style sheet, in which every character of a name is a number: none can end a text and start a rule.
     """
-    name, program = run.name[:LONGEST_NAME], f"frf_ipz {run.manifest.get('frf_ipz', '')}".strip()
-    when = str(run.manifest.get("when", ""))[:10]
+    program = f"frf_ipz {run.manifest.get('frf_ipz', '')}".strip()
+    return margin_style(run.name, program, str(run.manifest.get("when", ""))[:10])
+
+
+def margin_style(name: str, program: str, when: str) -> str:
+    """Write what stands in the margins of each printed page.
+
+    Parameters
+    ----------
+    name, program, when : str
+        Of what is printed.
+
+    Returns
+    -------
+    str
+        A style sheet, in which every character of a name is a number: none can end a text and start a rule.
+    """
     boxes = {
-        "top-left": _css_text(name),
+        "top-left": _css_text(name[:LONGEST_NAME]),
         "top-right": _css_text(when),
         "bottom-left": _css_text(program),
         "bottom-right": '"page " counter(page) " of " counter(pages)',

@@ -42,9 +42,7 @@ def page_data(run: Results, sections: Sequence[Section]) -> dict[str, object]:
         What JSON can hold.
     """
     packer = Packer()
-    pictures = {
-        picture.name: packer.pack(draw_picture(picture, n_alike=n_alike)) for picture, n_alike in pictures_of(sections)
-    }
+    pictures = packed_pictures(sections, packer)
     frequencies = [] if run.frfs is None else run.frfs.frequency_hz[run.frfs.frequency_hz > 0][:1].tolist()
     return {
         "pictures": pictures,
@@ -52,6 +50,26 @@ def page_data(run: Results, sections: Sequence[Section]) -> dict[str, object]:
         "frequencyScale": frequency_axis(*run.band_hz).scale,
         "lowestHz": min([1.0, *frequencies]),
         "arrays": packer.arrays,
+    }
+
+
+def packed_pictures(sections: Sequence[Section], packer: Packer) -> dict[str, object]:
+    """Draw the pictures of sections.
+
+    Parameters
+    ----------
+    sections : sequence of Section
+        With the pictures.
+    packer : Packer
+        Takes their arrays.
+
+    Returns
+    -------
+    dict of str to object
+        What JSON can hold, by the names of the pictures.
+    """
+    return {
+        picture.name: packer.pack(draw_picture(picture, n_alike=n_alike)) for picture, n_alike in pictures_of(sections)
     }
 
 

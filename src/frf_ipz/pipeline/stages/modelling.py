@@ -16,6 +16,8 @@ from frf_ipz.fe.reduction.reduce import reduce_to_dofs
 from frf_ipz.pairing.pair import pair_roots
 from frf_ipz.pipeline.sensors import unweighed_sensors
 from frf_ipz.pipeline.stages.mismatch import corrections, effects_of
+from frf_ipz.runs.digests import digest
+from frf_ipz.runs.software import software
 from frf_ipz.updating.parameters import make_structural_basis
 from frf_ipz.updating.update import update_model
 
@@ -69,26 +71,34 @@ def reduce(
     ReducedModel
         The reduced model.
     """
-    inputs = runner.inputs
+    inputs, shared = runner.inputs, runner.inputs.shared
     options = inputs.options.reduce
-    return runner.stage(
-        "reduce",
-        {
-            "options": asdict(options),
-            "model": inputs.model_key,
-            "corrected": corrections(corrected_by),
-            "after": runner.after("fit"),
-            "points": repr(inputs.points),
-        },
-        lambda _: reduce_to_dofs(
+    actuators = _once(label.input_dof for label in modal_fit.connections)
+    sensors = _once(label.output_dof for label in modal_fit.connections)
+    rests_on = {
+        "options": asdict(options),
+        "model": inputs.model_key,
+        "corrected": corrections(corrected_by),
+        "points": repr(inputs.points),
+    }
+
+    def compute() -> ReducedModel:
+        return reduce_to_dofs(
             model,
             options=options,
-            actuators=_once(label.input_dof for label in modal_fit.connections),
-            sensors=_once(label.output_dof for label in modal_fit.connections),
+            actuators=actuators,
+            sensors=sensors,
             points=inputs.points,
             band_hz=modal_fit.band_hz,
-        ),
-    )
+        )
+
+    def take_or_compute(_: Progress) -> ReducedModel:
+        if shared is None:
+            return compute()
+        measured = {"actuators": repr(actuators), "sensors": repr(sensors), "band_hz": modal_fit.band_hz}
+        return shared.reduce(digest({**rests_on, **measured, "software": software()}), compute)
+
+    return runner.stage("reduce", {**rests_on, "after": runner.after("fit")}, take_or_compute)
 
 
 def pair(runner: StageRunner, modal_fit: ModalFit, reduced: ReducedModel) -> Pairs:
