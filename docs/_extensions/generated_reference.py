@@ -27,6 +27,9 @@ from frf_ipz.export.state_space import StateSpaceModel
 from frf_ipz.export.state_space_files import ENSEMBLE, REDUCED_MODEL
 from frf_ipz.export.uncertainty import UncertaintyWeights
 from frf_ipz.fe.model_file import model_kinds
+from frf_ipz.fleet import population
+from frf_ipz.fleet.fleet_file import FleetFile
+from frf_ipz.fleet.tables import FILES as FLEET_FILES
 from frf_ipz.ingest.campaign_file import CampaignFileKeys
 from frf_ipz.pipeline.config import PipelineFile
 from frf_ipz.runs import folder as run_folder
@@ -71,6 +74,13 @@ def reference_pages() -> dict[str, str]:
         "pipeline_toml.md": _sections(sections(PipelineFile), level=2),
         "tables.md": "\n".join(_columns(name, columns) for name, columns in FILES.items()),
         "results.md": "\n".join(_entries(name, entries) for name, entries in file_entries().items()),
+        "fleet_toml.md": _sections(sections(FleetFile), level=2),
+        "fleet_tables.md": "\n".join(
+            [
+                *(_columns(name, columns) for name, columns in FLEET_FILES.items()),
+                _entries("population.json", population.JSON_KEYS),
+            ]
+        ),
         "effects.md": _effects(),
         "command.md": _command(),
     }
@@ -176,6 +186,8 @@ def _values(hint: object) -> str:
         return "table, see below"
     if isinstance(hint, type) and hint in PLAIN_TYPES:
         return PLAIN_TYPES[hint]
+    if hint is Any:
+        return "value"
     arguments = get_args(hint)
     writers = {
         Annotated: _annotated_values,

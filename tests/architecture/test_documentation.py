@@ -15,6 +15,7 @@ import frf_ipz
 from demo_case import make_demo
 from frf_ipz import plotting
 from frf_ipz.fe.model_file import model_kinds
+from frf_ipz.fleet.fleet_file import FleetFile
 from frf_ipz.ingest.campaign_file import CampaignFileKeys
 from frf_ipz.pipeline.config import PipelineFile
 from synthetic_run import synthetic_folder
@@ -63,6 +64,7 @@ def keys_of(kind):
 TOML_FILES = [
     ("test_toml.md", CampaignFileKeys),
     ("pipeline_toml.md", PipelineFile),
+    ("fleet_toml.md", FleetFile),
     *(("model_toml.md", kind.FILE) for kind in model_kinds().values()),
 ]
 
@@ -78,7 +80,7 @@ def test_every_key_of_every_toml_file_is_in_the_reference(reference, page, kind)
 def test_every_key_says_what_it_means(reference):
     rows = [
         row
-        for page in ("test_toml.md", "pipeline_toml.md", "model_toml.md")
+        for page in ("test_toml.md", "pipeline_toml.md", "model_toml.md", "fleet_toml.md")
         for row in re.findall(r"^\| `.*$", reference.reference_pages()[page], re.MULTILINE)
     ]
     assert [row for row in rows if not row.rstrip("| ").rpartition(" | ")[2].strip()] == []

@@ -103,6 +103,7 @@ def calls():
         ),
         "observe": ({"test": g.test, "frfs": g.frfs}, {"fit": [{}, 3]}),
         "open_results": ({"path": "results"}, {"path": [Path(__file__), Path(__file__).parent]}),
+        "open_fleet": ({"path": "results"}, {"path": [Path(__file__), Path(__file__).parent]}),
         "pair_roots": ({"fit": g.fit, "reduced_model": g.reduced_model}, {}),
         "parse_dof": ({"text": "1:x"}, {"text": ["", "1", "1:q", "-1:x"]}),
         "predict_frfs": (
@@ -131,6 +132,10 @@ def calls():
         "reduce_model": (
             {"measured": g.fit, "fe_model": g.beam},
             points | {"default_damping_ratio": [-0.1, 1.5, np.nan, "text"], "options": [{}, 3]},
+        ),
+        "run_fleet": (
+            {"path": "x.toml", "out": "results"},
+            {"path": [Path(__file__)], "out": [Path(__file__)], "jobs": [0, 1.5, "two", True], "only": [3, [3], "m1"]},
         ),
         "run_pipeline": ({"path": "x.toml", "out": "results"}, {"path": [Path(__file__)], "out": [Path(__file__)]}),
         "shift_to_measured_poles": ({"pairs": g.pairs, "reduced_model": g.reduced_model}, {}),

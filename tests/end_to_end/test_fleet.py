@@ -114,13 +114,12 @@ def test_the_model_is_read_once_and_reduced_once(fleet, tmp_path, monkeypatch):
     assert statuses == {f"m{k:02d}": "done" if k in {1, 3} else "not run" for k in range(1, 7)}
 
 
-def test_what_a_machine_gets_in_a_fleet_is_what_it_gets_alone(fleet, tmp_path, results):
-    alone = frf_ipz.run_pipeline(results.path / "pipelines" / "m01.toml", tmp_path / "alone", until="export")
+def test_what_a_machine_gets_in_a_fleet_is_what_it_gets_alone(tmp_path, results):
+    frf_ipz.run_pipeline(results.path / "pipelines" / "m01.toml", tmp_path / "alone", until="export")
     together = results.open("m01")
     for table in ("poles", "zeros", "parameters"):
-        name = "parameters.parquet" if table == "parameters" else f"{table}.parquet"
+        name = f"{table}.parquet"
         assert pq.read_table(tmp_path / "alone" / name).equals(pq.read_table(together.path / name))
-    del alone
 
 
 def test_one_fault_of_the_program_is_a_row_too(fleet, tmp_path, monkeypatch):

@@ -28,7 +28,7 @@ def test_nothing_is_promised_at_the_beginning_and_at_the_end(clock, fraction):
     assert estimate.remaining == ""
 
 
-def test_what_is_being_done_is_one_line(clock):
+def test_what_is_being_done_is_one_line():
     estimate = Estimate()
     estimate.update(0.0, "a\x1b[2J\nb")
     assert estimate.line == "a\\x1b[2J\\nb, 0 s so far"

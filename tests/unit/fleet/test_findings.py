@@ -84,4 +84,5 @@ def test_a_machine_with_another_size_has_a_fault_of_its_own_besides():
 
 
 def test_machines_without_a_diagnosis_say_nothing():
-    assert add_up_findings([MachineRecord(machine="m1", status="done"), MachineRecord(machine="m2", status="failed")]) == []
+    records = [MachineRecord(machine="m1", status="done"), MachineRecord(machine="m2", status="failed")]
+    assert add_up_findings(records) == []

@@ -76,7 +76,10 @@ WRONG = {
     "no machine": (HEAD, "names no machine"),
     "nothing fits": (HEAD + 'machines = "machine/*/test.toml"\n', "no file fits 'machine/*/test.toml'"),
     "absolute pattern": (HEAD + 'machines = "/machines/*/test.toml"\n', "a pattern is relative to this file"),
-    "unknown id": (HEAD + 'machines = "machines/*/test.toml"\n[[machine]]\nid = "a3"\n', "no such machine was found, and no 'test' is named; known are a1, a10, a2"),
+    "unknown id": (
+        HEAD + 'machines = "machines/*/test.toml"\n[[machine]]\nid = "a3"\n',
+        "no such machine was found, and no 'test' is named; known are a1, a10, a2",
+    ),
     "no test": (HEAD + '[[machine]]\nid = "a3"\n', "the key 'test' is missing"),
     "twice": (HEAD + 2 * '[[machine]]\nid = "a3"\ntest = "t.toml"\n', "the id 'a3' is there more than once"),
     "case": (

@@ -6,7 +6,7 @@ import pytest
 from frf_ipz.fleet.drift import find_drifts, position
 from frf_ipz.fleet.outliers import FEWEST, find_outliers
 
-TRIALS = 1000
+TRIALS = 400
 THREE_SIGMA = 3.0  # of a number of false alarms
 
 
@@ -14,7 +14,9 @@ THREE_SIGMA = 3.0  # of a number of false alarms
 def test_false_alarms_are_at_most_those_that_are_stated(count):
     level = 0.05
     rng = np.random.default_rng(count)
-    found = sum(find_outliers(rng.normal(size=count), np.zeros(count), level=level).is_outlier.any() for _ in range(TRIALS))
+    found = sum(
+        find_outliers(rng.normal(size=count), np.zeros(count), level=level).is_outlier.any() for _ in range(TRIALS)
+    )
     assert found <= TRIALS * level + THREE_SIGMA * np.sqrt(TRIALS * level)
     assert found > 0  # a test that never marks anything tells nothing
 

@@ -5,6 +5,8 @@ Dask itself gives what a killed worker was at to another one, and gives up on a 
 
 from __future__ import annotations
 
+from importlib import import_module
+from secrets import token_hex
 from typing import TYPE_CHECKING, Any
 
 from frf_ipz.errors import InputError
@@ -44,13 +46,9 @@ def run_on_cluster(
     InputError
         If Dask is not installed, or the scheduler does not answer.
     """
+    distributed = _distributed()
     try:
-        from dask.base import tokenize
-        from distributed import CancelledError, Client, as_completed
-    except ImportError:
-        raise InputError(EXTRA) from None
-    try:
-        client: Any = Client(scheduler, set_as_default=False)  # type: ignore[no-untyped-call]
+        client = distributed.Client(scheduler, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         reason = " ".join(str(error).split())
         raise InputError(
@@ -58,14 +56,14 @@ def run_on_cluster(
             "with --scheduler tcp://HOST:PORT"
         ) from None
     with client:
-        call = tokenize(object())  # of this call: what an earlier one has left on the cluster is not this one's
+        call = token_hex(8)  # of this call: what an earlier one has left on the cluster is not this one's
         model = client.submit(_hold, shared, pure=False, key=f"frf-ipz-model-{call}")
         futures = {
             client.submit(run_machine, task, model, pure=False, key=f"frf-ipz-{task.machine}-{call}"): task
             for task in tasks
         }
         try:
-            for future in as_completed(futures, loop=client.loop):  # type: ignore[no-untyped-call]
+            for future in distributed.as_completed(futures, loop=client.loop):
                 task = futures[future]
                 if future.status == "finished":
                     yield future.result()
@@ -73,8 +71,15 @@ def run_on_cluster(
                     raise InputError(LOST.format(scheduler))
                 else:
                     yield MachineRecord(machine=task.machine, status=FAILED, message=_said(future.exception()))
-        except (CancelledError, OSError):
+        except (distributed.CancelledError, OSError):
             raise InputError(LOST.format(scheduler)) from None
+
+
+def _distributed() -> Any:  # noqa: ANN401  a module without types
+    try:
+        return import_module("distributed")
+    except ImportError:
+        raise InputError(EXTRA) from None
 
 
 def _hold(shared: SharedModel | None) -> SharedModel | None:

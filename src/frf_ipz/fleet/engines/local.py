@@ -7,8 +7,10 @@ that kills its process each time, for want of memory say, is known for certain, 
 from __future__ import annotations
 
 import os
+import sys
 from collections import Counter
 from concurrent.futures.process import BrokenProcessPool
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from joblib import Parallel, cpu_count, delayed, parallel_config
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.pipeline.shared_model import SharedModel
 
+RSS_BYTES = 1 if sys.platform == "darwin" else 1024  # in which the system counts memory
 MOST_KILLED = 3  # processes at one machine, of which all but the first had nothing else to do
 
 
@@ -78,12 +81,11 @@ def default_jobs(n_machines: int) -> int:
 def _fitting_memory() -> int:
     """Each process holds what this one has held at most, the FE model above all, and as much again to work with it."""
     try:
-        import resource
-
+        resource = import_module("resource")  # not on Windows
         memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-        held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     except (ImportError, AttributeError, ValueError, OSError):
         return int(cpu_count())
+    held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * RSS_BYTES
     return int(memory // (2 * held))
 
 
