@@ -33,6 +33,8 @@ from .diagnosis.result import LawInTime as LawInTime
 from .diagnosis.result import LinearisedLaw as LinearisedLaw
 from .diagnosis.result import Misfit as Misfit
 from .dofs import Dof as Dof
+from .dofs import Port as Port
+from .dofs import PortDof as PortDof
 from .dofs import parse_dof as parse_dof
 from .errors import ConvergenceError as ConvergenceError
 from .errors import FileFormatError as FileFormatError

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from frf_ipz.arguments import describe, require_choice, require_type, take_array
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray, read_only, require_finite, require_shape
 from frf_ipz.display import Drawn, Tabulated
-from frf_ipz.dofs import Dof, as_dof, as_dofs
+from frf_ipz.dofs import AnyDof, as_dof, as_dofs
 from frf_ipz.errors import InputError, ShapeError
 from frf_ipz.quantities import FrfQuantity, as_quantity
 
@@ -48,8 +48,8 @@ class FrfLabel:
     ('20:-z / 18:+z', 'm/s^2/N', -1)
     """
 
-    output_dof: Dof
-    input_dof: Dof
+    output_dof: AnyDof
+    input_dof: AnyDof
     quantity: FrfQuantity
     output_channel: str = ""
     input_channel: str = ""
@@ -197,8 +197,8 @@ class FrfSet(Tabulated, Drawn):
         frequency_hz: ArrayLike,
         values: ArrayLike,
         *,
-        outputs: Sequence[Dof | str],
-        inputs: Sequence[Dof | str],
+        outputs: Sequence[AnyDof | str],
+        inputs: Sequence[AnyDof | str],
         quantity: FrfQuantity | str = FrfQuantity.ACCELERANCE,
         variance: ArrayLike | None = None,
         coherence: ArrayLike | None = None,
@@ -308,12 +308,12 @@ class FrfSet(Tabulated, Drawn):
         return np.asarray(self.window_decay_1_s + 2j * np.pi * self.frequency_hz, np.complex128)
 
     @property
-    def output_dofs(self) -> tuple[Dof, ...]:
+    def output_dofs(self) -> tuple[AnyDof, ...]:
         """The sensors' DOFs, each once, in the order of the labels."""
         return tuple(dict.fromkeys(label.output_dof for label in self.labels))
 
     @property
-    def input_dofs(self) -> tuple[Dof, ...]:
+    def input_dofs(self) -> tuple[AnyDof, ...]:
         """The excited DOFs, each once, in the order of the labels."""
         return tuple(dict.fromkeys(label.input_dof for label in self.labels))
 

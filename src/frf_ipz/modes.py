@@ -16,7 +16,7 @@ import numpy as np
 from frf_ipz.arguments import take_array
 from frf_ipz.arrays import ComplexArray, FloatArray, read_only, require_shape
 from frf_ipz.display import Concise
-from frf_ipz.dofs import Dof, as_dofs
+from frf_ipz.dofs import AnyDof, as_dofs
 from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity, as_quantity
@@ -55,7 +55,7 @@ class ModeSet(Concise):
     natural_frequency_hz: FloatArray
     damping_ratio: FloatArray
     shapes: ComplexArray
-    dofs: tuple[Dof, ...]
+    dofs: tuple[AnyDof, ...]
 
     def __post_init__(self) -> None:
         require_shape("the mode shapes", self.shapes, (len(self.dofs), len(self.natural_frequency_hz)))
@@ -101,10 +101,10 @@ class ModalParameters(Concise):
     natural_frequency_hz: FloatArray
     damping_ratio: FloatArray
     shapes: ComplexArray
-    dofs: tuple[Dof, ...]
+    dofs: tuple[AnyDof, ...]
     frequency_std_hz: FloatArray | None = None
     damping_ratio_std: FloatArray | None = None
-    input_dofs: tuple[Dof, ...] = ()
+    input_dofs: tuple[AnyDof, ...] = ()
     quantity: FrfQuantity = FrfQuantity.ACCELERANCE
 
     def __post_init__(self) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from scipy import sparse
 from frf_ipz.arguments import require_choice, take_array
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray, Matrix, require_finite, require_shape
 from frf_ipz.display import Concise, Drawn
-from frf_ipz.dofs import GENERALISED, Dof, as_dofs
+from frf_ipz.dofs import GENERALISED, AnyDof, Dof, Port, PortDof, as_dofs, bind_port, parse_dof
 from frf_ipz.errors import InputError, ShapeError
 from frf_ipz.numerics.constraints import AdmissibleMotions
 from frf_ipz.numerics.neighbours import lines_between_neighbours
@@ -36,6 +36,7 @@ SPACING_M = 1.0  # between nodes in a row, where nobody knows their positions
 DOFS_SHOWN = 6
 HELD = ("auto", "keep")
 GENERALISED_LABEL = re.compile(r"\s*([0-9]{1,18})\s*:\s*[q0]\s*")
+GROUND = 0  # the node that does not move
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -152,6 +153,8 @@ class StructuralModel(Drawn):
         What was recognised in the matrices, and how they were taken.
     rounding : float
         Relative rounding of the entries of the stiffness matrix: that of double precision, or of printed digits.
+    ports : tuple of Port
+        Inputs and outputs that are no single DOFs.
     source : object
         The options it was built from (`fe.model_file`), for effects that build it anew; None for a model without.
     full_indices : mapping of Dof to int
@@ -192,6 +195,7 @@ class StructuralModel(Drawn):
     held_dofs: tuple[Dof, ...] = ()
     notes: tuple[str, ...] = ()
     rounding: float = EPS
+    ports: tuple[Port, ...] = ()
     source: object = None
     full_indices: Mapping[Dof, int] = field(init=False, repr=False)
 
@@ -209,6 +213,7 @@ class StructuralModel(Drawn):
             if getattr(self, name).shape != (n_all, n_all):
                 raise InputError(f"{name} is {getattr(self, name).shape}, but the model has {n_all} DOFs")
         require_shape("the marks of held DOFs", self.fixed, (n_all,))
+        self._check_ports()
 
     @classmethod
     def from_matrices(
@@ -339,6 +344,41 @@ class StructuralModel(Drawn):
             rounding=matrices.rounding,
         )
 
+    def with_ports(self, ports: Sequence[Port]) -> StructuralModel:
+        """Add inputs and outputs that are no single DOFs.
+
+        Parameters
+        ----------
+        ports : sequence of Port
+            Beside those that the model has.
+
+        Returns
+        -------
+        StructuralModel
+            The same model, which knows these names.
+
+        Raises
+        ------
+        InputError
+            If two ports have one name, a DOF is none of the model, or all of a port's DOFs are held.
+
+        Examples
+        --------
+        >>> import frf_ipz
+        >>> beam = frf_ipz.make_beam(
+        ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700,
+        ...     elements=10, left="clamped",
+        ... ).with_ports([frf_ipz.Port("tip tilt", {"11:z": 20.0, "10:z": -20.0}, "rad")])
+        >>> beam.rows(["-tip tilt"]).toarray()[0, -4:].tolist()
+        [20.0, 0.0, -20.0, 0.0]
+        """
+        return replace(self, ports=(*self.ports, *ports))
+
+    @property
+    def port_dofs(self) -> dict[PortDof, PortDof]:
+        """Labels of the ports, each by itself: what is looked up has the unit of its port."""
+        return {port.dof: port.dof for port in self.ports}
+
     @property
     def dofs(self) -> tuple[Dof, ...]:
         """The DOFs that are free, in the order of `mass` and `stiffness`."""
@@ -427,6 +467,102 @@ class StructuralModel(Drawn):
             )
         return int(np.count_nonzero(~self.fixed[:index]))
 
+    def full_rows(self, dofs: Sequence[AnyDof | Port | str]) -> Matrix:
+        """Motions that sensors measure, or how forces act, in all DOFs.
+
+        Parameters
+        ----------
+        dofs : sequence of Dof, PortDof, Port or str
+            DOFs, ports, or their labels; their signs count.
+
+        Returns
+        -------
+        (n_dofs, n_all) sparse array
+            Weights of all DOFs, held ones included.
+
+        Raises
+        ------
+        InputError
+            If the model has no such DOF or port.
+        """
+        entries = [
+            (row, self.full_index(dof), weight)
+            for row, label in enumerate(as_dofs(dofs))
+            for dof, weight in self._weights(label).items()
+            if dof.node != GROUND and dof not in self.held_dofs
+        ]
+        rows, columns, weights = zip(*entries, strict=True) if entries else ((), (), ())
+        shape = (len(dofs), len(self.all_dofs))
+        return sparse.csr_array((np.array(weights, float), (rows, columns)), shape=shape)
+
+    def rows(self, dofs: Sequence[AnyDof | Port | str]) -> Matrix:
+        """Motions that sensors measure, or how forces act, in the free DOFs.
+
+        Parameters
+        ----------
+        dofs : sequence of Dof, PortDof, Port or str
+            DOFs, ports, or their labels; their signs count.
+
+        Returns
+        -------
+        (n_dofs, n) sparse array
+            Weights of the rows of `mass` and `stiffness`.
+
+        Raises
+        ------
+        InputError
+            If the model has no such DOF or port, or holds it.
+        """
+        for label in as_dofs(dofs):
+            if isinstance(label, Dof):
+                self.index(label)
+        return self.full_rows(dofs)[:, np.flatnonzero(~self.fixed)]
+
+    def dofs_in(self, dofs: Sequence[AnyDof | Port | str]) -> tuple[Dof, ...]:
+        """DOFs that take part in some motions: those themselves, and those with a weight in a port.
+
+        Parameters
+        ----------
+        dofs : sequence of Dof, PortDof, Port or str
+            DOFs, ports, or their labels.
+
+        Returns
+        -------
+        tuple of Dof
+            Unsigned, each once; those of the ground and of held DOFs without a row are left out.
+
+        Raises
+        ------
+        InputError
+            If the model has no such DOF or port.
+        """
+        taking_part = (dof for label in as_dofs(dofs) for dof, weight in self._weights(label).items() if weight)
+        return tuple(dict.fromkeys(dof for dof in taking_part if dof in self.full_indices))
+
+    def _weights(self, label: AnyDof) -> dict[Dof, float]:
+        if isinstance(label, Dof):
+            self.full_index(label)
+            return {label.unsigned: float(label.sign)}
+        bound = bind_port(label, self.port_dofs)
+        port = next(port for port in self.ports if port.dof == bound.unsigned)
+        return {dof: label.sign * weight for dof, weight in port.weights.items()}
+
+    def _check_ports(self) -> None:
+        for number, port in enumerate(self.ports):
+            if port.name in [known.name for known in self.ports[:number]]:
+                raise InputError(f"two ports are called '{port.name}'; rename one")
+            moving = []
+            for dof, weight in port.weights.items():
+                if dof.node == GROUND or dof in self.held_dofs:
+                    continue
+                if dof not in self.full_indices:
+                    raise InputError(f"the port '{port.name}': {self._missing_dof_message(dof)}")
+                moving.append(weight != 0 and not self.fixed[self.full_indices[dof]])
+            if not any(moving):
+                raise InputError(
+                    f"the port '{port.name}' does not move: its DOFs are held in the model '{self.name}'; use others"
+                )
+
     def _free_block(self, matrix: Matrix) -> Matrix:
         if not self.fixed.any():
             return matrix
@@ -460,12 +596,12 @@ class ReducedModel:
     ----------
     mass, damping, stiffness : (r, r) array
         M_r, B_r and K_r. Symmetric when they leave the reduction; `ipz` may leave K_r and B_r slightly unsymmetric.
-    dofs : tuple of Dof
-        The retained DOFs, unsigned, one a row.
+    dofs : tuple of Dof or PortDof
+        The retained DOFs and ports, unsigned, one a row.
     expansion : (n_expanded, r) array
         Motion of other DOFs of the full model for unit motions of the retained ones.
-    expanded_dofs : tuple of Dof
-        Rows of `expansion`, unsigned; they contain the retained ones.
+    expanded_dofs : tuple of Dof or PortDof
+        Rows of `expansion`, unsigned; they contain the retained ones, and all ports of the full model.
     n_modes : int
         Eigenmodes in the reduction basis, rigid-body modes included.
     residual_dofs : tuple of Dof
@@ -503,11 +639,11 @@ class ReducedModel:
     mass: FloatArray
     damping: FloatArray
     stiffness: FloatArray
-    dofs: tuple[Dof, ...]
+    dofs: tuple[AnyDof, ...]
     expansion: FloatArray
-    expanded_dofs: tuple[Dof, ...]
+    expanded_dofs: tuple[AnyDof, ...]
     n_modes: int
-    residual_dofs: tuple[Dof, ...] = ()
+    residual_dofs: tuple[AnyDof, ...] = ()
     choices: tuple[str, ...] = ()
     dashpots: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     rigid: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
@@ -526,12 +662,12 @@ class ReducedModel:
             require_shape(f"the reduced {name} matrix", getattr(self, name), (order, order))
         require_shape("the expansion", self.expansion, (len(self.expanded_dofs), order))
 
-    def row(self, dof: Dof) -> FloatArray:
-        """Motion of a DOF for unit motions of the retained ones.
+    def row(self, dof: AnyDof) -> FloatArray:
+        """Motion of a DOF or a port for unit motions of the retained ones.
 
         Parameters
         ----------
-        dof : Dof
+        dof : Dof or PortDof
             Its sign counts.
 
         Returns
@@ -548,7 +684,8 @@ class ReducedModel:
             row = self.expanded_dofs.index(dof.unsigned)
         except ValueError:
             raise InputError(
-                f"the reduced model does not know the DOF {dof.name}; add it to [predict] points"
+                f"the reduced model does not know the {'DOF' if isinstance(dof, Dof) else 'port'} {dof.name}; add it "
+                "to [predict] points"
             ) from None
         return np.asarray(dof.sign * self.expansion[row])
 
@@ -598,10 +735,10 @@ def drawn_geometry(
 def _rows(dofs: Sequence[Dof | str]) -> tuple[Dof, ...]:
     """Take the DOFs of rows; a generalised one is no DOF that a label names."""
     if isinstance(dofs, str | Dof) or not isinstance(dofs, Iterable):
-        return as_dofs(dofs, name="dofs")
+        as_dofs(dofs, name="dofs")  # raises
     matches = [GENERALISED_LABEL.fullmatch(dof) if isinstance(dof, str) else None for dof in dofs]
     return tuple(
-        Dof(int(match[1]), GENERALISED) if match else as_dofs([dof], name="dofs")[0].unsigned
+        Dof(int(match[1]), GENERALISED) if match else (dof if isinstance(dof, Dof) else parse_dof(dof)).unsigned
         for dof, match in zip(dofs, matches, strict=True)
     )
 

@@ -121,8 +121,8 @@ def calls():
                 "path": [Path(__file__), Path("x.csv")],
                 "quantity": ["inertia", 3],
                 "unit": ["parsec", 3],
-                "output": ["text", 3],
-                "input": ["text", 3],
+                "output": ["1:q", 3],
+                "input": ["1:q", 3],
             },
         ),
         "read_model": ({"path": "x.toml"}, {"path": [Path(__file__)]}),
@@ -159,8 +159,8 @@ def calls():
             {
                 "frequency_hz": [[1.0], [2.0, 1.0], [np.nan, 1.0], [-1.0, 1.0], "text", [[1.0, 2.0]]],
                 "values": [np.ones((2, 1)), np.full((2, 1, 1), np.nan), np.array([[[1.0]], [[np.inf]]]), "text", None],
-                "outputs": [["text"], [], "1:x", 3],
-                "inputs": [["text"], [], "1:x", 3],
+                "outputs": [["1:q"], [], "1:x", 3],
+                "inputs": [["1:q"], [], "1:x", 3],
                 "quantity": ["inertia", 3, None],
                 "variance": [np.ones(2), "text"],
                 "coherence": [np.ones(2), "text"],
@@ -190,8 +190,8 @@ def calls():
                 "force": [np.ones(9), np.full(10, np.nan), "text", np.ones((2, 10))],
                 "responses": [np.ones((2, 10)), np.full((1, 10), np.inf), "text"],
                 "sample_rate_hz": [0.0, -1.0, np.nan, "text"],
-                "input_dof": ["text", 3],
-                "output_dofs": [["text"], [], "1:x", 3],
+                "input_dof": ["1:q", 3],
+                "output_dofs": [["1:q"], [], "1:x", 3],
                 "quantity": ["force", 3],
             },
         ),
@@ -271,7 +271,7 @@ def test_plots_refuse_an_frf_a_column_and_a_label_that_is_not_there():
     for name, arguments in {
         "plot_prediction": {"prediction": prediction, "frf": 1},
         "plot_mismatch": {"diagnosis": g.diagnosis, "column": "never"},
-        "plot_structure": {"geometry": g.beam.geometry, "sensors": ["text"]},
+        "plot_structure": {"geometry": g.beam.geometry, "sensors": ["1:q"]},
         "plot_fit": {"frfs": g.frfs, "fit": 3},
     }.items():
         with pytest.raises(frf_ipz.InputError):

@@ -129,10 +129,9 @@ def _add_linearised_law(model: StructuralModel, law: LinearisedLaw) -> Structura
 def _model_context(model: StructuralModel, curves: Curves) -> ModelContext:
     """Gather what effects may use, as it was when they were searched for."""
     layout = make_layout(curves.labels)
-    measured_rows = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
     highest = float(curves.s.imag.max())
     return ModelContext(
-        basis=make_basis(model, highest, measured_rows),
+        basis=make_basis(model, highest, layout.dofs),
         layout=layout,
         band_hz=(float(curves.s.imag.min()) / (2 * np.pi), highest / (2 * np.pi)),
         contour=curves.s,
@@ -221,6 +220,5 @@ def _channel_names(label: FrfLabel) -> tuple[str, str]:
 
 def _relabel(label: FrfLabel, moved: Mapping[str, int]) -> FrfLabel:
     node = moved.get(_channel_names(label)[0])
-    if node is None:
-        return label
-    return replace(label, output_dof=Dof(node, label.output_dof.direction, label.output_dof.sign))
+    dof = label.output_dof
+    return label if node is None or not isinstance(dof, Dof) else replace(label, output_dof=replace(dof, node=node))

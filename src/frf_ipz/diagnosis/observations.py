@@ -11,7 +11,7 @@ import numpy as np
 from frf_ipz.arguments import require_type
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, read_only, require_shape
 from frf_ipz.display import Concise
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import AnyDof
 from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfSet
 from frf_ipz.identification.measured_lines import measured_lines
@@ -40,14 +40,14 @@ class Sensor:
     ----------
     channel : str
         Column of the recordings.
-    dof : Dof
+    dof : Dof or PortDof
         Its position and direction, with its sign.
     quantity : FrfQuantity
         What it measures, as the FRF over a force.
     """
 
     channel: str
-    dof: Dof
+    dof: AnyDof
     quantity: FrfQuantity
 
 
@@ -61,7 +61,7 @@ class ObservedRecord(Concise):
         As in the table of records.
     input_channel : str
         Column of the force.
-    input_dof : Dof
+    input_dof : Dof or PortDof
         Where it was excited, with its sign: the force on the model's DOF is this sign times `force`.
     sensors : tuple of Sensor
         Rows of `responses`.
@@ -85,7 +85,7 @@ class ObservedRecord(Concise):
 
     name: str
     input_channel: str
-    input_dof: Dof
+    input_dof: AnyDof
     sensors: tuple[Sensor, ...]
     step_s: float
     force: FloatArray
@@ -169,7 +169,7 @@ class Observations(Concise):
     exclude_hz: tuple[tuple[float, float], ...] = ()
 
     @property
-    def input_dofs(self) -> tuple[Dof, ...]:
+    def input_dofs(self) -> tuple[AnyDof, ...]:
         """Excited DOFs, each once."""
         return tuple(dict.fromkeys(record.input_dof for record in self.records))
 
@@ -198,12 +198,12 @@ class Observations(Concise):
             is_inside &= (frequency_hz < low - width_hz) | (frequency_hz > high + width_hz)
         return np.asarray(is_inside)
 
-    def records_at(self, input_dof: Dof) -> tuple[ObservedRecord, ...]:
+    def records_at(self, input_dof: AnyDof) -> tuple[ObservedRecord, ...]:
         """List the records with the input at one DOF, the strongest first.
 
         Parameters
         ----------
-        input_dof : Dof
+        input_dof : Dof or PortDof
             One of `input_dofs`.
 
         Returns

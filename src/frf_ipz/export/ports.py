@@ -11,7 +11,7 @@ from frf_ipz.quantities import FrfQuantity, frf_quantity_of
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.export.options import ExportOptions
     from frf_ipz.frf import FrfLabel
 
@@ -22,7 +22,7 @@ class Output:
 
     Parameters
     ----------
-    dof : Dof
+    dof : Dof or PortDof
         Its sign counts.
     quantity : FrfQuantity
         Determines whether it is a displacement, a velocity or an acceleration.
@@ -30,7 +30,7 @@ class Output:
         Its delay.
     """
 
-    dof: Dof
+    dof: AnyDof
     quantity: FrfQuantity
     delay_s: float = 0.0
 
@@ -52,7 +52,7 @@ class Ports:
         The sensors, then the points of interest without a sensor.
     """
 
-    inputs: tuple[Dof, ...]
+    inputs: tuple[AnyDof, ...]
     outputs: tuple[Output, ...]
 
     @property
@@ -62,7 +62,7 @@ class Ports:
 
 
 def choose_ports(
-    labels: Sequence[FrfLabel], points: Sequence[Dof], options: ExportOptions, delays_s: Mapping[str, float]
+    labels: Sequence[FrfLabel], points: Sequence[AnyDof], options: ExportOptions, delays_s: Mapping[str, float]
 ) -> Ports:
     """Choose inputs and outputs from the measured FRFs, the points of interest and the options.
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     import control
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import Measured
     from frf_ipz.structure import ReducedModel
 
@@ -122,7 +122,7 @@ def make_state_space(
     measured: Measured,
     updated_model: UpdatedModel,
     *,
-    points: Sequence[Dof | str] = (),
+    points: Sequence[AnyDof | str] = (),
     options: ExportOptions | None = None,
     delays_s: Mapping[str, float] | None = None,
 ) -> StateSpaceModel:
@@ -163,7 +163,7 @@ def make_state_space_ensemble(
     measured: Measured,
     updated_model: UpdatedModel,
     *,
-    points: Sequence[Dof | str] = (),
+    points: Sequence[AnyDof | str] = (),
     options: ExportOptions | None = None,
     delays_s: Mapping[str, float] | None = None,
 ) -> tuple[StateSpaceModel, ...]:
@@ -213,7 +213,7 @@ def to_state_space(
     measured: Measured,
     updated_model: UpdatedModel,
     *,
-    points: Sequence[Dof | str] = (),
+    points: Sequence[AnyDof | str] = (),
     options: ExportOptions | None = None,
     delays_s: Mapping[str, float] | None = None,
 ) -> control.StateSpace:
@@ -264,7 +264,7 @@ def to_state_space_ensemble(
     measured: Measured,
     updated_model: UpdatedModel,
     *,
-    points: Sequence[Dof | str] = (),
+    points: Sequence[AnyDof | str] = (),
     options: ExportOptions | None = None,
     delays_s: Mapping[str, float] | None = None,
 ) -> list[control.StateSpace]:
@@ -438,6 +438,6 @@ def _scale_notes(scale: MeasuredScale) -> tuple[str, ...]:
 
 
 def _ports(
-    measured: Measured, points: Sequence[Dof | str], options: ExportOptions, delays_s: Mapping[str, float] | None
+    measured: Measured, points: Sequence[AnyDof | str], options: ExportOptions, delays_s: Mapping[str, float] | None
 ) -> Ports:
     return choose_ports(measured.connections, list(as_dofs(points)), options, delays_s or {})

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     import control
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import Measured
 
 WEIGHT_LINES = 400  # of the band, at equal ratios, on which the error of an output is bounded
@@ -99,7 +99,7 @@ def estimate_uncertainty_weights(
     measured: Measured,
     updated_model: UpdatedModel,
     *,
-    points: Sequence[Dof | str] = (),
+    points: Sequence[AnyDof | str] = (),
     frequency_hz: FloatArray | None = None,
 ) -> UncertaintyWeights:
     """Bound the relative error of the members of the posterior, for every sensor and point of interest.
@@ -174,7 +174,7 @@ def estimate_uncertainty_weights(
     )
 
 
-def _relative_error(updated: UpdatedModel, output: Dof, inputs: Sequence[Dof], s: ComplexArray) -> FloatArray:
+def _relative_error(updated: UpdatedModel, output: AnyDof, inputs: Sequence[AnyDof], s: ComplexArray) -> FloatArray:
     model = updated.model
     lowest = float(np.abs(s).min())
     updated_frfs = ModelEnsemble(matrices=np.array([(model.mass, model.damping, model.stiffness)]), lowest_rad_s=lowest)

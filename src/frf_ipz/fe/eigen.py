@@ -158,9 +158,9 @@ def solve_modes(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
     Returns
     -------
     ModeSet
-        By ascending frequency, at the free DOFs, mass-normalised; rigid-body modes have the frequency 0, and those of a
-        negative stiffness, ``omega^2 < 0``, a negative one. The damping ratios are those that the model states, plus
-        the diagonal of its viscous and structural damping in each mode.
+        By ascending frequency, at the free DOFs and then at the ports, mass-normalised; rigid-body modes have the
+        frequency 0, and those of a negative stiffness, ``omega^2 < 0``, a negative one. The damping ratios are those
+        that the model states, plus the diagonal of its viscous and structural damping in each mode.
 
     Raises
     ------
@@ -185,11 +185,13 @@ def solve_modes(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
     require_type("n_modes", n_modes, int, np.integer, optional=True)
     require_type("up_to_hz", up_to_hz, float, int, np.number, optional=True)
     basis = solve_basis(model, n_modes=n_modes, up_to_hz=up_to_hz)
+    ports = tuple(model.port_dofs)
+    at_ports = [np.asarray(model.rows(ports) @ basis.shapes)] if ports else []
     return ModeSet(
         natural_frequency_hz=basis.natural_frequency_hz,
         damping_ratio=damping_ratios(model, basis),
-        shapes=basis.shapes.astype(np.complex128),
-        dofs=model.dofs,
+        shapes=np.vstack([basis.shapes, *at_ports]).astype(np.complex128),
+        dofs=(*model.dofs, *ports),
     )
 
 

@@ -12,6 +12,7 @@ from frf_ipz.arguments import as_path
 from frf_ipz.errors import FileFormatError, did_you_mean
 from frf_ipz.fe import kinds
 from frf_ipz.fe.model_options import ModelSection
+from frf_ipz.fe.model_ports import with_stated_ports
 from frf_ipz.toml_files import read_toml
 
 if TYPE_CHECKING:
@@ -119,7 +120,8 @@ def read_model(path: str | Path) -> StructuralModel:
     """
     path = as_path(path)
     kind, file = _read_options(path)
-    return kind.read(file.model.system.options_in_si(file), path)
+    model = kind.read(file.model.system.options_in_si(file), path)
+    return with_stated_ports(model, getattr(file, "port", ()), path)  # a user's own kind may have none
 
 
 def model_files(path: Path) -> tuple[Path, ...]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from frf_ipz.option_types import Name, NotNegative, Ratio
+from frf_ipz.option_types import Finite, Name, NotNegative, Ratio
 from frf_ipz.toml_files import STRICT
 from frf_ipz.unit_systems import SI, UnitSystem
 
@@ -122,3 +122,44 @@ class DampingSection:
             raise ValueError(
                 "needs exactly one of modal_ratio, rayleigh and loss_factor; leave the section out for no damping"
             )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PortSection:
+    """``[[port]]``: an input or output that is no single DOF. Either `dofs` and `unit`, or `point_m` and `direction`.
+
+    Parameters
+    ----------
+    name : str
+        May stand wherever a DOF label may; no colon, no sign at its beginning.
+    dofs : mapping of str to float
+        Weight of each DOF, SI whatever the units of the model.
+    unit : str, optional
+        ``m`` or ``rad``; with a point it follows from the direction.
+    point_m : (3,) tuple of float, optional
+        A point of the mesh, m, where the motion is interpolated from the nodes around.
+    direction : str or (3,) tuple of float
+        ``x``, ``y``, ``z``, a rotation ``rx``, ``ry``, ``rz``, with a sign or without, or a vector along which the
+        motion is measured.
+
+    Raises
+    ------
+    ValueError
+        If it is neither a sum of DOFs nor a point.
+    """
+
+    __pydantic_config__ = STRICT
+
+    name: Name
+    dofs: dict[str, Finite] | None = None
+    unit: Literal["m", "rad"] | None = None
+    point_m: tuple[Finite, Finite, Finite] | None = None
+    direction: str | tuple[Finite, Finite, Finite] | None = None
+
+    def __post_init__(self) -> None:
+        if (self.dofs is None) == (self.point_m is None):
+            raise ValueError("needs either dofs or point_m")
+        if self.dofs is not None and self.unit is None:
+            raise ValueError("needs a unit beside dofs: m, or rad for an angle")
+        if (self.point_m is None) != (self.direction is None):
+            raise ValueError("needs point_m and direction together, and neither beside dofs")

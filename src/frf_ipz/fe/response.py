@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arguments import require_each, require_type, take_array
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray, Matrix
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import ModalBasis, mode_damping_ratios, solve_basis
 from frf_ipz.frf import FrfLabel
@@ -23,7 +23,7 @@ from frf_ipz.structure import ReducedModel, StructuralModel
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
 
 MODES_BEYOND = 3.0  # times the highest frequency: modes above follow in the series
 SERIES_TERMS = 5  # the last one is off by (1/3)^10 of the first mode beyond
@@ -124,8 +124,8 @@ def model_poles(model: StructuralModel | ReducedModel, *, up_to_hz: float | None
 class _Ends:
     """Output and input DOFs of FRFs, each once, and the products of the signs."""
 
-    outputs: list[Dof]
-    inputs: list[Dof]
+    outputs: list[AnyDof]
+    inputs: list[AnyDof]
     output_of: list[int]
     input_of: list[int]
     sign: FloatArray
@@ -153,10 +153,9 @@ def _reduced_receptances(model: ReducedModel, labels: Sequence[FrfLabel], s: Com
 
 def _modal_receptances(model: StructuralModel, labels: Sequence[FrfLabel], s: ComplexArray) -> ComplexArray:
     ends = _Ends.of_labels(labels)
-    output_rows = [model.index(dof) for dof in ends.outputs]
-    input_rows = [model.index(dof) for dof in ends.inputs]
+    output_rows, input_rows = model.rows(ends.outputs), model.rows(ends.inputs)
     basis = _basis_up_to(model, s)
-    outputs, inputs = basis.shapes[output_rows], basis.shapes[input_rows]
+    outputs, inputs = np.asarray(output_rows @ basis.shapes), np.asarray(input_rows @ basis.shapes)
     damping = _modal_damping(model, basis)
     if damping.ndim == 1:
         resonance = 1 / (s[:, None] ** 2 + s[:, None] * damping + basis.eigenvalues)
@@ -192,16 +191,17 @@ def _modal_damping(model: StructuralModel, basis: ModalBasis) -> FloatArray:
     return viscous + np.diag(stated)
 
 
-def _flexibility_series(basis: ModalBasis, output_rows: list[int], input_rows: list[int]) -> FloatArray:
+def _flexibility_series(basis: ModalBasis, output_rows: Matrix, input_rows: Matrix) -> FloatArray:
     """Sum phi phi^T / omega^2, / omega^4, ... over the modes beyond, (n_terms, n_outputs, n_inputs)."""
     # flexibility is symmetric: load the side that has fewer DOFs
-    loaded, observed = (input_rows, output_rows) if len(input_rows) <= len(output_rows) else (output_rows, input_rows)
-    loads = np.zeros((len(basis.shapes), len(loaded)))
-    loads[loaded, np.arange(len(loaded))] = 1.0
+    fewer_inputs = input_rows.shape[0] <= output_rows.shape[0]
+    loaded, observed = (input_rows, output_rows) if fewer_inputs else (output_rows, input_rows)
+    loads = loaded.toarray().T
     terms = []
     for _ in range(SERIES_TERMS):
         deflection = basis.residual_flexibility(loads)
-        terms.append(deflection[observed] if loaded is input_rows else deflection[observed].T)
+        term = np.asarray(observed @ deflection)
+        terms.append(term if fewer_inputs else term.T)
         loads = np.asarray(multiply(basis.mass, deflection))
     return np.array(terms)
 

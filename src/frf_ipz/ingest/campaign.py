@@ -17,7 +17,7 @@ import numpy as np
 from frf_ipz.arguments import require_choice, require_each, require_type, take_array
 from frf_ipz.arrays import FloatArray, read_only
 from frf_ipz.display import Concise
-from frf_ipz.dofs import Dof, as_dof, as_dofs
+from frf_ipz.dofs import AnyDof, Dof, PortDof, as_dof, as_dofs, bind_port
 from frf_ipz.errors import InputError, QuantityError, did_you_mean
 from frf_ipz.frf import SCALES, FrfLabel, FrfSet
 from frf_ipz.ingest.formats.frf_file import FrfSource
@@ -79,7 +79,7 @@ class Channel:
     quantity: str
     unit: str = ""
     sensitivity: str = ""
-    dof: Dof | None = None
+    dof: AnyDof | None = None
     mass_kg: float = 0.0
 
     @property
@@ -94,7 +94,7 @@ class TestSetup(Concise):
 
     Parameters
     ----------
-    input_dof : Dof
+    input_dof : Dof or PortDof
         Where the force acts, with its sign.
     output_dofs : tuple of Dof
         Where the outputs sit, in the order of the output channels.
@@ -124,8 +124,8 @@ class TestSetup(Concise):
     ('1:+z', 3)
     """
 
-    input_dof: Dof
-    output_dofs: tuple[Dof, ...]
+    input_dof: AnyDof
+    output_dofs: tuple[AnyDof, ...]
     files: tuple[Path, ...]
     variables: tuple[tuple[str, str], ...] = ()
 
@@ -211,8 +211,8 @@ class Recording(Concise):
     force: FloatArray
     responses: FloatArray
     sample_rate_hz: float
-    input_dof: Dof | str
-    output_dofs: Sequence[Dof | str]
+    input_dof: AnyDof | str
+    output_dofs: Sequence[AnyDof | str]
     quantity: str = "acceleration"
 
     def __post_init__(self) -> None:
@@ -391,7 +391,7 @@ class VibrationTest(Concise):
             for place in range(count)
         ]
         paths = [Path(f"recording {place + 1}") for place in range(len(recordings))]
-        layout_files: dict[tuple[Dof, tuple[Dof, ...]], list[Path]] = {}
+        layout_files: dict[tuple[AnyDof, tuple[AnyDof, ...]], list[Path]] = {}
         for path, recording in zip(paths, recordings, strict=True):
             layout_files.setdefault(
                 (as_dof(recording.input_dof), tuple(map(as_dof, recording.output_dofs))), []
@@ -509,7 +509,7 @@ class VibrationTest(Concise):
             modes=modes,
         )
 
-    def with_forces_at(self, points: Sequence[Dof]) -> VibrationTest:
+    def with_forces_at(self, points: Sequence[AnyDof]) -> VibrationTest:
         """Let forces of a test of modes that names none act at the points of interest; without any, at its first DOF.
 
         Parameters
@@ -527,6 +527,63 @@ class VibrationTest(Concise):
         modes = replace(self.modes, input_dofs=tuple(points) or self.modes.dofs[:1])
         return replace(self, modes=modes, labels=modes.labels)
 
+    def with_ports(self, ports: Mapping[PortDof, PortDof]) -> VibrationTest:
+        """Find the ports that the test names, so that their units are known.
+
+        Parameters
+        ----------
+        ports : mapping of PortDof to PortDof
+            Those of the model, as `StructuralModel.port_dofs` lists them.
+
+        Returns
+        -------
+        VibrationTest
+            The same test.
+
+        Raises
+        ------
+        InputError
+            If it names a port that the model does not have.
+        """
+
+        def bound(label: FrfLabel) -> FrfLabel:
+            return replace(
+                label, output_dof=bind_port(label.output_dof, ports), input_dof=bind_port(label.input_dof, ports)
+            )
+
+        def found(dof: AnyDof | None) -> AnyDof | None:
+            return None if dof is None else bind_port(dof, ports)
+
+        return replace(
+            self,
+            channels=tuple(replace(channel, dof=found(channel.dof)) for channel in self.channels),
+            setups=tuple(
+                replace(
+                    setup,
+                    input_dof=bind_port(setup.input_dof, ports),
+                    output_dofs=tuple(bind_port(dof, ports) for dof in setup.output_dofs),
+                )
+                for setup in self.setups
+            ),
+            frf_sources=tuple(
+                replace(
+                    source,
+                    output_dofs=tuple(bind_port(dof, ports) for dof in source.output_dofs),
+                    input_dofs=tuple(bind_port(dof, ports) for dof in source.input_dofs),
+                )
+                for source in self.frf_sources
+            ),
+            labels=tuple(map(bound, self.labels)),
+            frfs=None if self.frfs is None else replace(self.frfs, labels=tuple(map(bound, self.frfs.labels))),
+            modes=None
+            if self.modes is None
+            else replace(
+                self.modes,
+                dofs=tuple(bind_port(dof, ports) for dof in self.modes.dofs),
+                input_dofs=tuple(bind_port(dof, ports) for dof in self.modes.input_dofs),
+            ),
+        )
+
     @property
     def input_channel(self) -> Channel:
         """The force."""
@@ -538,12 +595,12 @@ class VibrationTest(Concise):
         return self.channels[1:]
 
     @property
-    def output_dofs(self) -> tuple[Dof, ...]:
+    def output_dofs(self) -> tuple[AnyDof, ...]:
         """Where sensors sit in any of the FRFs, each once."""
         return tuple(dict.fromkeys([*(self.modes.dofs if self.modes else ()), *(x.output_dof for x in self.labels)]))
 
     @property
-    def input_dofs(self) -> tuple[Dof, ...]:
+    def input_dofs(self) -> tuple[AnyDof, ...]:
         """Where forces act in any of the FRFs, each once."""
         return tuple(dict.fromkeys(label.input_dof for label in self.labels))
 
@@ -594,7 +651,7 @@ class VibrationTest(Concise):
         masses: Counter[int] = Counter()
         for setup in setups:
             for channel, dof in zip(self.output_channels, setup.output_dofs, strict=True):
-                if channel.mass_kg:
+                if channel.mass_kg and isinstance(dof, Dof):
                     masses[dof.node] += channel.mass_kg * len(setup.files) / n_files  # type: ignore[assignment] # kg, no count
         return dict(masses)
 

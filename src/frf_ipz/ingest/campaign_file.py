@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from frf_ipz.arguments import require_file
-from frf_ipz.dofs import Dof, as_direction, parse_dof
+from frf_ipz.dofs import AnyDof, Dof, as_direction, parse_label
 from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean, errors_of_file
 from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.campaign import (
@@ -31,6 +31,8 @@ from frf_ipz.toml_files import STRICT, read_toml
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+
+    from frf_ipz.dofs import PortDof
 
 ENTRY_OF_KIND = {"hammer": "hit", "random": "record", "frf": "frf", "modes": "modes"}
 
@@ -298,6 +300,7 @@ def read_test(path: str | Path) -> VibrationTest:
     setups = tuple(
         _read_setup(path, entry, channels, f"[[{ENTRY_OF_KIND[keys.test.kind]}]] {entry.dof}") for entry in entries
     )
+    setups = tuple(_with_port_units(setup, channels) for setup in setups)
     _check_units(path, channels, setups)
     _check_files_once(path, setups)
     sources = tuple(_read_source(path, entry) for entry in keys.frf)
@@ -396,6 +399,53 @@ def _read_channel(path: Path, keys: ChannelKeys) -> Channel:
     )
 
 
+def bind_ports(test: VibrationTest, ports: Mapping[PortDof, PortDof]) -> VibrationTest:
+    """Find the ports that a test names in its model, and check the units of their channels.
+
+    Parameters
+    ----------
+    test : VibrationTest
+        As it was read.
+    ports : mapping of PortDof to PortDof
+        Those of the model, as `StructuralModel.port_dofs` lists them.
+
+    Returns
+    -------
+    VibrationTest
+        With the units of the ports.
+
+    Raises
+    ------
+    FileFormatError
+        If it names a port that the model does not have.
+    QuantityError
+        If a channel at an angle is measured as a length, or the other way round.
+    """
+    with errors_of_file(test.path):
+        bound = test.with_ports(ports)
+    if not test.signals:
+        _check_units(test.path, bound.channels, bound.setups)
+    return bound
+
+
+def _with_port_units(setup: TestSetup, channels: tuple[Channel, ...]) -> TestSetup:
+    """Take from the units of channels whether ports are angles, until a model says so."""
+    ends = zip((setup.input_dof, *setup.output_dofs), channels, strict=True)
+    input_dof, *output_dofs = (_with_port_unit(dof, channel) for dof, channel in ends)
+    return replace(setup, input_dof=input_dof, output_dofs=tuple(output_dofs))
+
+
+def _with_port_unit(dof: AnyDof, channel: Channel) -> AnyDof:
+    if isinstance(dof, Dof) or not (channel.unit or channel.sensitivity):
+        return dof
+    convert = sensitivity_factor if channel.sensitivity else unit_factor
+    try:
+        convert(channel.sensitivity or channel.unit, channel.quantity, rotational=True)
+    except InputError:
+        return dof
+    return replace(dof, unit="rad")
+
+
 def _check_units(path: Path, channels: tuple[Channel, ...], setups: tuple[TestSetup, ...]) -> None:
     """Refuse units that cannot be right before anything is read; a moment or a rotation has its own."""
     for setup in setups:
@@ -444,11 +494,11 @@ def _read_variables(
     return tuple(variables.items())
 
 
-def _check_motions(path: Path, outputs: tuple[Channel, ...], dofs: tuple[Dof, ...], where: str) -> None:
+def _check_motions(path: Path, outputs: tuple[Channel, ...], dofs: tuple[AnyDof, ...], where: str) -> None:
     """Refuse two outputs that would measure the same motion: FRFs are distinguished by DOFs and quantity."""
-    channel_of_motion: dict[tuple[int, str, str], Channel] = {}
+    channel_of_motion: dict[tuple[AnyDof, str], Channel] = {}
     for channel, dof in zip(outputs, dofs, strict=True):
-        first = channel_of_motion.setdefault((dof.node, dof.direction, channel.quantity), channel)
+        first = channel_of_motion.setdefault((dof.unsigned, channel.quantity), channel)
         if first is not channel:
             problem = f"'{first.column}' and '{channel.column}' both measure the {channel.quantity} at {dof}"
             raise FileFormatError(path, f"{problem}; correct a 'dof', or take one channel out", where=where)
@@ -496,14 +546,14 @@ def _parse_direction(path: Path, text: str, where: str) -> str:
         return as_direction(text)
 
 
-def _parse_dofs(path: Path, texts: str | tuple[str, ...] | None, where: str) -> tuple[Dof, ...]:
+def _parse_dofs(path: Path, texts: str | tuple[str, ...] | None, where: str) -> tuple[AnyDof, ...]:
     given = () if texts is None else (texts,) if isinstance(texts, str) else texts
     return tuple(_parse_dof(path, text, where) for text in given)
 
 
-def _parse_dof(path: Path, text: str, where: str) -> Dof:
+def _parse_dof(path: Path, text: str, where: str) -> AnyDof:
     try:
-        return parse_dof(text)
+        return parse_label(text)
     except InputError as error:
         raise FileFormatError(path, str(error), where=where) from None
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.ingest.campaign import Channel, TestSetup, VibrationTest
     from frf_ipz.ingest.formats.recording import RawRecording
 
@@ -204,7 +204,7 @@ def _time_factor(recording: RawRecording) -> float:
         raise QuantityError(f"{recording.path}, column '{recording.time_column}': {error}") from None
 
 
-def _channel_factor(path: Path, channel: Channel, dof: Dof, file_unit: str) -> float:
+def _channel_factor(path: Path, channel: Channel, dof: AnyDof, file_unit: str) -> float:
     """Return the factor to SI; the units of test and file must agree, and one of them must be stated."""
     rotational = dof.direction.startswith("r")
     file_unit = file_unit if is_stated(file_unit) else ""

@@ -11,7 +11,7 @@ from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros
 
 if TYPE_CHECKING:
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.structure import ReducedModel
 
@@ -83,7 +83,7 @@ def model_poles(model: ReducedModel, labels: tuple[FrfLabel, ...]) -> ModelPoles
     return ModelPoles(values=roots.values, amplitudes=(residues * 2j * np.abs(roots.values)).T)
 
 
-def model_shapes(model: ReducedModel, dofs: tuple[Dof, ...]) -> ModelPoles:
+def model_shapes(model: ReducedModel, dofs: tuple[AnyDof, ...]) -> ModelPoles:
     """Compute the poles of a model with their shapes at some DOFs.
 
     Parameters

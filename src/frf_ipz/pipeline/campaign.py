@@ -11,7 +11,7 @@ from frf_ipz.diagnosis.catalogue.effect import Effect
 from frf_ipz.diagnosis.nonlinear.laws.law import Law
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.display import Concise
-from frf_ipz.dofs import as_dofs
+from frf_ipz.dofs import as_dofs, bind_port
 from frf_ipz.errors import InputError
 from frf_ipz.export.options import ExportOptions
 from frf_ipz.fe.reduction.options import ReduceOptions
@@ -35,7 +35,7 @@ from frf_ipz.updating.options import UpdateOptions
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.progress import Progress
     from frf_ipz.runs.results import Results
 
@@ -95,7 +95,7 @@ class Campaign(Concise):
     data: FrfSet | VibrationTest | ModalParameters
     fe_model: StructuralModel | None = None
     _: KW_ONLY
-    points: Sequence[Dof | str] = ()
+    points: Sequence[AnyDof | str] = ()
     name: str = "campaign"
     effects: Sequence[Effect | Law] = ()
     reference: FrfSet | None = None
@@ -166,8 +166,9 @@ class Campaign(Concise):
         """
         chosen = {stage: getattr(self, stage) for stage in OPTIONS}
         options = replace(StageOptions(), **{stage: value for stage, value in chosen.items() if value is not None})
-        points = as_dofs(self.points)
-        test = without_sensors(self._test(), options.ingest.hide).with_forces_at(points)
+        ports = {} if self.fe_model is None else self.fe_model.port_dofs
+        points = tuple(bind_port(dof, ports) for dof in as_dofs(self.points))
+        test = without_sensors(self._test(), options.ingest.hide).with_ports(ports).with_forces_at(points)
         if self.fe_model is None and points:
             raise InputError("points of interest need an FE model; hand it in as the second argument")
         ledger = Ledger()
@@ -210,4 +211,5 @@ def _digest_model(model: StructuralModel) -> str:
     matrices = [model.mass_all, model.stiffness_all, model.damping_all, model.modal_damping, model.fixed]
     further = [model.structural_damping_all, None if model.motions is None else model.motions.matrix]
     matrices += [matrix for matrix in further if matrix is not None]
-    return digest_arrays([*matrices, [str(dof) for dof in model.all_dofs]])
+    weights = [f"{port!r} {dict(port.weights)}" for port in model.ports]
+    return digest_arrays([*matrices, [str(dof) for dof in model.all_dofs], weights])

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
-from frf_ipz.dofs import Dof, parse_dof
-from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.dofs import AnyDof, bind_port, parse_label
+from frf_ipz.errors import FileFormatError, InputError, errors_of_file
 from frf_ipz.fe.changes import with_default_damping, with_point_masses
 from frf_ipz.fe.model_file import model_files, read_model
-from frf_ipz.ingest.campaign_file import read_test
+from frf_ipz.ingest.campaign_file import bind_ports, read_test
 from frf_ipz.ingest.estimation.frf_files import read_frfs
 from frf_ipz.input_files import Ledger, digest_file, entering
 from frf_ipz.pipeline.config import StageOptions, read_pipeline
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
+    from frf_ipz.dofs import PortDof
     from frf_ipz.frf import FrfSet
     from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.pipeline.config import Pipeline
@@ -70,7 +71,7 @@ class PipelineInputs:
     options: StageOptions
     test: VibrationTest
     fe_model: StructuralModel | None = None
-    points: tuple[Dof, ...] = ()
+    points: tuple[AnyDof, ...] = ()
     effects: tuple[Effect | Law, ...] = ()
     digests: Mapping[str, str] = field(default_factory=dict)
     measurement_names: tuple[str, ...] = ()
@@ -131,15 +132,21 @@ def read_inputs(path: Path, *, shared: SharedModel | None = None) -> PipelineInp
 
 def _read_inputs(path: Path, ledger: Ledger, shared: SharedModel | None) -> PipelineInputs:
     pipeline = read_pipeline(path)
-    points = _read_points(pipeline)
-    test = _read_test(pipeline).with_forces_at(points)
-    fe_model = None if pipeline.model_path is None else _read_model(pipeline.model_path, test, points, shared)
-    if fe_model is None and points:
+    test = _read_test(pipeline)
+    nominal = None if pipeline.model_path is None else _read_model(pipeline.model_path, shared)
+    ports = {} if nominal is None else nominal.port_dofs
+    points = _read_points(pipeline, ports)
+    test = bind_ports(test, ports).with_forces_at(points)
+    if nominal is None and points:
         raise FileFormatError(
             pipeline.path,
             "points of interest need an FE model; name it as [pipeline] model",
             where="key 'predict.points'",
         )
+    fe_model = None
+    if nominal is not None and pipeline.model_path is not None:
+        with errors_of_file(pipeline.model_path):
+            fe_model = complete_model(nominal, test, points)
     files_of_model = () if pipeline.model_path is None else model_files(pipeline.model_path)
     # what was found by other code of the user's is not what this one finds
     effects = (file for file in pipeline.file.diagnose.effect_files(pipeline.path.parent) if file.is_file())
@@ -164,7 +171,7 @@ def _read_inputs(path: Path, ledger: Ledger, shared: SharedModel | None) -> Pipe
     )
 
 
-def complete_model(fe_model: StructuralModel, test: VibrationTest, points: Sequence[Dof]) -> StructuralModel:
+def complete_model(fe_model: StructuralModel, test: VibrationTest, points: Sequence[AnyDof]) -> StructuralModel:
     """Add to an FE model what the test knows of it: the sensors' masses, and damping where the model states none.
 
     Parameters
@@ -188,7 +195,7 @@ def complete_model(fe_model: StructuralModel, test: VibrationTest, points: Seque
     """
     for dof in (*test.output_dofs, *test.input_dofs, *points):
         try:
-            fe_model.index(dof)
+            fe_model.rows([dof])
         except InputError as error:
             raise InputError(f"{error}; it is needed for '{dof}' of the test or of [predict]") from None
     return with_point_masses(with_default_damping(fe_model, test.nominal_damping_ratio), test.sensor_masses)
@@ -202,16 +209,12 @@ def _read_test(pipeline: Pipeline) -> VibrationTest:
         raise FileFormatError(pipeline.path, str(error), where="key 'ingest.hide'") from None
 
 
-def _read_points(pipeline: Pipeline) -> tuple[Dof, ...]:
+def _read_points(pipeline: Pipeline, ports: Mapping[PortDof, PortDof]) -> tuple[AnyDof, ...]:
     try:
-        return tuple(parse_dof(text) for text in pipeline.file.predict.points)
+        return tuple(bind_port(parse_label(text), ports) for text in pipeline.file.predict.points)
     except InputError as error:
         raise FileFormatError(pipeline.path, str(error), where="key 'predict.points'") from None
 
 
-def _read_model(path: Path, test: VibrationTest, points: Sequence[Dof], shared: SharedModel | None) -> StructuralModel:
-    fe_model = read_model(path) if shared is None or shared.path != path else shared.model
-    try:
-        return complete_model(fe_model, test, points)
-    except InputError as error:
-        raise FileFormatError(path, str(error)) from None
+def _read_model(path: Path, shared: SharedModel | None) -> StructuralModel:
+    return read_model(path) if shared is None or shared.path != path else shared.model

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from frf_ipz.dofs import parse_dof
+from frf_ipz.dofs import node_dofs, parse_label
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.quantities import FrfQuantity
 
@@ -30,7 +30,8 @@ def unweighed_sensors(test: VibrationTest, labels: Sequence[FrfLabel]) -> tuple[
     Returns
     -------
     tuple of Dof
-        Unsigned, each node once. Where sensors roved, none: their mass was at another point for each record.
+        Unsigned, each node once, ports left out. Where sensors roved, none: their mass was at another point for each
+        record.
     """
     inputs = {label.input_dof for label in labels}
     measured = {(label.output_dof, label.input_dof) for label in labels}
@@ -38,7 +39,7 @@ def unweighed_sensors(test: VibrationTest, labels: Sequence[FrfLabel]) -> tuple[
     if len(measured) < len(inputs) * len({label.output_dof for label in labels}):
         return ()
     weighed = {node for node, mass in test.sensor_masses.items() if mass > 0}
-    return tuple({dof.node: dof.unsigned for dof in outputs if dof.node not in weighed}.values())
+    return tuple({dof.node: dof.unsigned for dof in node_dofs(outputs) if dof.node not in weighed}.values())
 
 
 def without_sensors(test: VibrationTest, hidden: Sequence[str]) -> VibrationTest:
@@ -61,7 +62,7 @@ def without_sensors(test: VibrationTest, hidden: Sequence[str]) -> VibrationTest
     InputError
         If no sensor sits at such a DOF, or none is left.
     """
-    left_out = {parse_dof(text).unsigned: text for text in hidden}
+    left_out = {parse_label(text).unsigned: text for text in hidden}
     names = {dof.unsigned: str(dof) for dof in test.output_dofs}
     for dof, text in left_out.items():
         if dof not in names:

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from frf_ipz.arrays import ComplexArray
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.plotting.picture import Picture
 
 
@@ -626,9 +626,9 @@ def plot_prediction(
 def plot_structure(
     geometry: Geometry,
     *,
-    sensors: Sequence[Dof | str] = (),
-    inputs: Sequence[Dof | str] = (),
-    points: Sequence[Dof | str] = (),
+    sensors: Sequence[AnyDof | str] = (),
+    inputs: Sequence[AnyDof | str] = (),
+    points: Sequence[AnyDof | str] = (),
     ax: Axes | None = None,
 ) -> Axes:
     """Draw a structure with sensors, inputs and points of interest.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.dofs import node_dofs
 from frf_ipz.plotting.picture import Axis, Colour, Labels, Layer, Line, Panel, Picture, Points, Role, joined_segments
 from frf_ipz.plotting.projection import project
 from frf_ipz.plotting.wording import listed, number
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from frf_ipz.diagnosis.result import Diagnosis
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfSet
     from frf_ipz.structure import Geometry
 
@@ -64,15 +65,15 @@ class StructureMarks:
         Title of the axis under a structure that is a line.
     """
 
-    sensors: Sequence[Dof] = ()
-    inputs: Sequence[Dof] = ()
-    points: Sequence[Dof] = ()
+    sensors: Sequence[AnyDof] = ()
+    inputs: Sequence[AnyDof] = ()
+    points: Sequence[AnyDof] = ()
     missing: Mapping[int, str] = field(default_factory=dict)
     mismatch: Mapping[int, str] = field(default_factory=dict)
     across: str = "Position, m"
 
     @property
-    def dofs(self) -> dict[str, Sequence[Dof]]:
+    def dofs(self) -> dict[str, Sequence[AnyDof]]:
         """The DOFs by the name of their mark."""
         return {SENSOR_NAME: self.sensors, INPUT_NAME: self.inputs, POINT_NAME: self.points}
 
@@ -169,8 +170,8 @@ def _nodes_of(location: Mapping[str, object], frfs: FrfSet | None) -> list[int]:
     named = location.get("channels")
     channels = set(named) if isinstance(named, tuple | list) else set()
     for label in () if frfs is None or nodes else frfs.labels:
-        nodes += [label.output_dof.node] if label.output_channel in channels else []
-        nodes += [label.input_dof.node] if label.input_channel in channels else []
+        ends = ((label.output_dof, label.output_channel), (label.input_dof, label.input_channel))
+        nodes += [dof.node for dof in node_dofs(dof for dof, channel in ends if channel in channels)]
     return nodes
 
 
@@ -182,7 +183,7 @@ def _plan(geometry: Geometry | None, marks: StructureMarks) -> tuple[IntArray, F
     """Nodes, their positions on the drawing, and lines as pairs of nodes."""
     if geometry is None:
         dofs = (*marks.sensors, *marks.inputs, *marks.points)
-        nodes = np.array(sorted({dof.node for dof in dofs if dof.node > 0}), int)
+        nodes = np.array(sorted({dof.node for dof in node_dofs(dofs) if dof.node > 0}), np.int64)
         positions = np.stack([nodes, np.zeros(len(nodes))], 1).astype(float)
         return nodes, positions, np.stack([nodes[:-1], nodes[1:]], 1)
     return geometry.nodes, project(geometry.coordinates_m), geometry.lines
@@ -229,9 +230,9 @@ def _supports(geometry: Geometry | None, positions: FloatArray, rows: Mapping[in
 
 
 def _dofs(
-    name: str, dofs: Sequence[Dof], positions: FloatArray, rows: Mapping[int, int], *, is_line: bool
+    name: str, dofs: Sequence[AnyDof], positions: FloatArray, rows: Mapping[int, int], *, is_line: bool
 ) -> list[Layer]:
-    known = [dof for dof in dofs if dof.node in rows]
+    known = [dof for dof in node_dofs(dofs) if dof.node in rows]
     if not known:
         return []
     mark, texts = MARKS[name], [str(dof) for dof in known]

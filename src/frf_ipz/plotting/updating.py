@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.dofs import Dof
 from frf_ipz.plotting.picture import Axis, Band, Bars, Layer, Line, Panel, Picture, Points, Role
 from frf_ipz.plotting.projection import project
 from frf_ipz.plotting.wording import counted, number, percent
@@ -221,7 +222,10 @@ def describe_flexibility_change(
     dofs = updated.nominal.expanded_dofs
     directions = {dof.direction for label in labels for dof in (label.output_dof, label.input_dof)}
     node_rows = {int(node): row for row, node in enumerate(geometry.nodes)}
-    rows = np.array([row for row, dof in enumerate(dofs) if dof.direction in directions and dof.node in node_rows], int)
+    node_of_row = {
+        row: dof.node for row, dof in enumerate(dofs) if isinstance(dof, Dof) and dof.direction in directions
+    }
+    rows = np.array([row for row, node in node_of_row.items() if node in node_rows], np.int64)
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST_POINTS).astype(int))] if len(rows) else rows
     before, after = (_flexibility(model, rows) for model in (updated.nominal, updated.model))
     is_moving = before > STIFF * before.max(initial=0.0)
@@ -229,7 +233,7 @@ def describe_flexibility_change(
     if len(rows) < 2:
         return None
     names = [dofs[row].name for row in rows]
-    positions = project(geometry.coordinates_m)[[node_rows[dofs[row].node] for row in rows]]
+    positions = project(geometry.coordinates_m)[[node_rows[node_of_row[row]] for row in rows.tolist()]]
     is_line = not np.ptp(positions[:, 1])
     extremes = f"from {number(float(change.min()), 3)} to {number(float(change.max()), 3)} %"
     return Picture(

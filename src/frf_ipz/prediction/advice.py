@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.dofs import node_dofs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.prediction.ensemble import ModelEnsemble
     from frf_ipz.rational import ZeroSet
@@ -180,13 +181,13 @@ def _observed_modes(ensemble: ModelEnsemble) -> int:
 
 def _candidates(
     updated_model: ReducedModel, measured: Sequence[FrfLabel], predicted: FrfLabel
-) -> list[tuple[str, Dof, Dof]]:
+) -> list[tuple[str, AnyDof, AnyDof]]:
     sensors = list(dict.fromkeys(label.output_dof.unsigned for label in measured))
     excited = list(dict.fromkeys(label.input_dof.unsigned for label in measured))
     directions = {dof.direction for dof in (*sensors, *excited)}
-    dofs = [
+    dofs: list[AnyDof] = [
         dof
-        for dof in updated_model.expanded_dofs
+        for dof in node_dofs(updated_model.expanded_dofs)
         if dof.direction in directions and dof != predicted.output_dof.unsigned
     ]
     kept = np.unique(np.linspace(0, len(dofs) - 1, MAX_CANDIDATES).astype(int)) if dofs else ()

@@ -13,7 +13,7 @@ import numpy as np
 
 from frf_ipz.arguments import require_type, take_array
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.dofs import Dof, as_dofs
+from frf_ipz.dofs import AnyDof, as_dofs
 from frf_ipz.errors import InputError
 from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel, Measured, require_measured
@@ -37,7 +37,7 @@ def predict_frfs(
     measured: Measured,
     updated_model: UpdatedModel,
     *,
-    points: Sequence[Dof | str],
+    points: Sequence[AnyDof | str],
     frequency_hz: FloatArray | None = None,
 ) -> Prediction:
     """Predict FRFs from every excited DOF of the test to points of interest.

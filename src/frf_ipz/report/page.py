@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.runs.results import Results
 
 Build: TypeAlias = "Callable[[Results], Section | None]"
@@ -247,7 +247,7 @@ def frf_chooser(run: Results) -> dict[str, object] | None:
     """
     if not run.labels:
         return None
-    boxes: dict[tuple[Dof, Dof], list[FrfBox]] = {}
+    boxes: dict[tuple[AnyDof, AnyDof], list[FrfBox]] = {}
     for number, label in enumerate(run.labels):
         box = FrfBox(
             number=number,

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from frf_ipz.assessment.assessment import Assessment
     from frf_ipz.diagnosis.measured.levels import LevelDependence
     from frf_ipz.diagnosis.result import Diagnosis
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.frf import FrfLabel, FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
@@ -308,7 +308,7 @@ class Results:
         return () if self.frfs is None else self.frfs.labels
 
     @property
-    def points(self) -> tuple[Dof, ...]:
+    def points(self) -> tuple[AnyDof, ...]:
         """The points of interest."""
         return () if self.prediction is None else tuple(dict.fromkeys(x.output_dof for x in self.prediction.labels))
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
 import tomlkit
 from tomlkit.items import AoT
 
-from frf_ipz.dofs import parse_dof
+from frf_ipz.dofs import parse_label
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.ingest.survey.selection import is_named
 from frf_ipz.toml_files import STRICT, to_options
@@ -259,9 +259,9 @@ class Sensor:
         InputError
             If it is no label of a DOF.
         """
-        sensor = parse_dof(self.dof)
+        sensor = parse_label(self.dof)
         ingest = section_of(document, "ingest")
-        remove_entries(ingest, "hide", lambda entry: parse_dof(entry).unsigned == sensor.unsigned)
+        remove_entries(ingest, "hide", lambda entry: parse_label(entry).unsigned == sensor.unsigned)
         if self.on:
             append_entry(ingest, "hide", str(sensor))
 
@@ -296,9 +296,9 @@ class Point:
         InputError
             If it is no label of a DOF.
         """
-        point = parse_dof(self.dof)
+        point = parse_label(self.dof)
         predict = section_of(document, "predict")
-        remove_entries(predict, "points", lambda entry: parse_dof(entry) == point)
+        remove_entries(predict, "points", lambda entry: parse_label(entry) == point)
         if self.on:
             append_entry(predict, "points", str(point))
 
@@ -333,7 +333,7 @@ class Retain:
         InputError
             If none is named, or one is no label of a DOF.
         """
-        names = list(dict.fromkeys(parse_dof(text).name for text in self.dofs))
+        names = list(dict.fromkeys(parse_label(text).name for text in self.dofs))
         reduce = section_of(document, "reduce")
         if self.on and not names:
             raise InputError("name the DOFs to reduce to, or take the choice back to leave it to the program")

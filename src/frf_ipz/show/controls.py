@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pipeline.config import PipelineFile
@@ -166,7 +166,7 @@ def _use(name: str, choices: PipelineFile) -> str:
     return "keep" if is_named(name, choices.ingest.keep) else "checks"
 
 
-def dof_forms(run: Results, choices: PipelineFile, retained: Sequence[Dof]) -> Form:
+def dof_forms(run: Results, choices: PipelineFile, retained: Sequence[AnyDof]) -> Form:
     """Let the user choose points of interest, leave sensors out, and choose what the model is reduced to.
 
     Parameters

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.dofs import node_dofs
 from frf_ipz.plotting.picture import Layer, Panel, Picture, Points, Role, Span, VerticalLines, with_layers
 from frf_ipz.plotting.projection import project
 from frf_ipz.plotting.wording import counted
@@ -15,7 +16,7 @@ from frf_ipz.rational import natural_frequency_hz
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.identification.options import FitOptions
     from frf_ipz.structure import Geometry
@@ -58,7 +59,7 @@ def with_choices(picture: Picture, fit: ModalFit, options: FitOptions) -> Pictur
     return with_layers(replace(picture, panels=(taller,), note=note), *layers)
 
 
-def with_retained(picture: Picture, geometry: Geometry, dofs: Sequence[Dof]) -> Picture:
+def with_retained(picture: Picture, geometry: Geometry, dofs: Sequence[AnyDof]) -> Picture:
     """Ring the nodes whose DOFs the model is reduced to.
 
     Parameters
@@ -76,7 +77,7 @@ def with_retained(picture: Picture, geometry: Geometry, dofs: Sequence[Dof]) -> 
         With the rings.
     """
     rows = {int(node): row for row, node in enumerate(geometry.nodes)}
-    known = [dof for dof in dofs if dof.node in rows]
+    known = [dof for dof in node_dofs(dofs) if dof.node in rows]
     if not known:
         return picture
     coordinates = project(geometry.coordinates_m)[[rows[dof.node] for dof in known]]

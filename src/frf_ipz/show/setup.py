@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.structure import Geometry
 
@@ -74,5 +74,5 @@ def _what_was_read(inputs: PipelineInputs) -> Table:
     return Table(caption="What was read", columns=("", "in the files"), rows=rows)
 
 
-def _names(dofs: tuple[Dof, ...]) -> str:
+def _names(dofs: tuple[AnyDof, ...]) -> str:
     return listed([str(dof) for dof in dofs], 24) if dofs else "none"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.dofs import Dof, node_dofs
 from frf_ipz.errors import InputError
 from frf_ipz.modes import modal_assurance
 from frf_ipz.numerics.pencils import damped_poles
@@ -19,7 +20,7 @@ from frf_ipz.rational import natural_frequency_hz
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.runs.results import Results
@@ -52,7 +53,7 @@ class Motion:
 
     name: str
     title: str
-    dofs: tuple[Dof, ...]
+    dofs: tuple[AnyDof, ...]
     values: ComplexArray
 
 
@@ -156,7 +157,7 @@ def operating_shape(run: Results, hertz: float, input_dof: str) -> Shape:
     return Shape(title=f"At {frfs.frequency_hz[line]:.5g} Hz for 1 N at {input_dof}", motions=tuple(motions))
 
 
-def _measured_shape(fit: ModalFit, number: int) -> dict[Dof, complex]:
+def _measured_shape(fit: ModalFit, number: int) -> dict[AnyDof, complex]:
     """Give the shape of a mode by DOF: as it was stated, or from residues."""
     if fit.modes_given is not None:
         modes = fit.modes_given.as_model_has_them()
@@ -165,9 +166,9 @@ def _measured_shape(fit: ModalFit, number: int) -> dict[Dof, complex]:
     return _largest_row(fit.labels, fit.model.residues[number] / fit.model.poles[number] ** powers)
 
 
-def _largest_row(labels: tuple[FrfLabel, ...], residues: ComplexArray) -> dict[Dof, complex]:
+def _largest_row(labels: tuple[FrfLabel, ...], residues: ComplexArray) -> dict[AnyDof, complex]:
     """Take a mode's shape from the residues of the row or column of the FRF matrix that shows it best."""
-    rows: dict[tuple[str, Dof], dict[Dof, complex]] = {}
+    rows: dict[tuple[str, AnyDof], dict[AnyDof, complex]] = {}
     for label, residue in zip(labels, residues, strict=True):
         value = complex(residue) * label.sign
         sensor, input_dof = label.output_dof.unsigned, label.input_dof.unsigned
@@ -177,7 +178,7 @@ def _largest_row(labels: tuple[FrfLabel, ...], residues: ComplexArray) -> dict[D
     return max((row for row in rows.values() if len(row) == longest), key=lambda row: np.linalg.norm(_values(row)))
 
 
-def _values(moved: Mapping[Dof, complex]) -> ComplexArray:
+def _values(moved: Mapping[AnyDof, complex]) -> ComplexArray:
     return np.array(list(moved.values()), np.complex128)
 
 
@@ -274,13 +275,14 @@ def draw_shape(shape: Shape, geometry: Geometry | None) -> dict[str, Any]:
 def _plan(geometry: Geometry | None, motions: Sequence[Motion]) -> tuple[IntArray, FloatArray, IntArray]:
     """Nodes, their positions in space, and lines as pairs of nodes."""
     if geometry is None:
-        nodes = np.array(sorted({dof.node for motion in motions for dof in motion.dofs if dof.node > 0}), int)
+        named = {dof.node for motion in motions for dof in node_dofs(motion.dofs)}
+        nodes = np.array(sorted(node for node in named if node > 0), np.int64)
         positions = np.zeros((len(nodes), 3))
         positions[:, 0] = nodes
         return nodes, positions, np.stack([nodes[:-1], nodes[1:]], 1)
     if len(geometry.nodes) <= MOST_NODES:
         return geometry.nodes, geometry.coordinates_m, geometry.lines
-    measured = {dof.node for motion in motions if motion.name == "measured" for dof in motion.dofs}
+    measured = {dof.node for motion in motions if motion.name == "measured" for dof in node_dofs(motion.dofs)}
     is_drawn = np.isin(geometry.nodes, list(measured))
     is_drawn[:: -(-len(geometry.nodes) // MOST_NODES)] = True
     return geometry.nodes[is_drawn], geometry.coordinates_m[is_drawn], geometry.lines
@@ -290,7 +292,7 @@ def _move(motion: Motion, node_rows: dict[int, int], *, is_row: bool) -> tuple[I
     """Which points move, and how, across and up. In a row of nodes all motion is drawn upwards."""
     moved: dict[int, ComplexArray] = {}
     for dof, value in zip(motion.dofs, motion.values, strict=True):
-        if dof.direction in AXES and dof.node in node_rows:
+        if isinstance(dof, Dof) and dof.direction in AXES and dof.node in node_rows:
             moved.setdefault(node_rows[dof.node], np.zeros(3, complex))[AXES[dof.direction]] = value
     if len(moved) > len(node_rows) / 2:  # a model that knows nearly all nodes: the others are held
         moved = {row: moved.get(row, np.zeros(3, complex)) for row in node_rows.values()}

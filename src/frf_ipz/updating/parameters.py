@@ -30,7 +30,7 @@ from frf_ipz.updating.regions import Region, reduced_regions
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
 
 GLOBAL_STD = 0.1  # of the logarithm of a factor common to all parts: a wrong modulus or thickness
 SEGMENT_STD = 0.05  # of each term with a correlation length
@@ -206,7 +206,7 @@ def generic_basis(model: ReducedModel, *, std: float = GENERIC_STD_ALONE, common
 
 
 def make_structural_basis(
-    fe_model: StructuralModel, reduced_model: ReducedModel, *, mass: bool = False, sensors: Sequence[Dof | str] = ()
+    fe_model: StructuralModel, reduced_model: ReducedModel, *, mass: bool = False, sensors: Sequence[AnyDof | str] = ()
 ) -> ParameterBasis:
     """Factors on the parts of the FE model, masses of sensors, and generic changes that parts cannot express.
 
@@ -309,7 +309,7 @@ def unwhiten(terms: tuple[PriorTerm, ...], scales: FloatArray, whitened: FloatAr
     return np.asarray(whitened @ root.T)
 
 
-def _sensor_basis(model: ReducedModel, sensors: Sequence[Dof]) -> ParameterBasis:
+def _sensor_basis(model: ReducedModel, sensors: Sequence[AnyDof]) -> ParameterBasis:
     """Mass of each sensor, kg; without those that measure a rotation."""
     dofs = [dof for dof in dict.fromkeys(dof.unsigned for dof in sensors) if not dof.direction.startswith("r")]
     rows = np.array([model.row(dof) for dof in dofs]).reshape(len(dofs), len(model.dofs))

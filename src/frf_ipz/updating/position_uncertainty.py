@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import AnyDof
 
 if TYPE_CHECKING:
     from frf_ipz.updating.problem import UpdateProblem
@@ -24,7 +24,7 @@ class PositionUncertainty:
 
     Parameters
     ----------
-    dof : Dof
+    dof : Dof or PortDof
         DOF of the sensor or the excitation.
     is_output : bool
         True for a sensor.
@@ -54,7 +54,7 @@ class PositionUncertainty:
     (True, (6,))
     """
 
-    dof: Dof
+    dof: AnyDof
     is_output: bool
     row: FloatArray
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
+from frf_ipz.dofs import Dof, node_dofs
 from frf_ipz.fe.assembly import multiply
 
 if TYPE_CHECKING:
@@ -90,8 +91,9 @@ def motion_of_all_dofs(fe_model: StructuralModel, reduced_model: ReducedModel) -
     """
     motion = np.zeros((len(fe_model.all_dofs), len(reduced_model.dofs)))
     known = fe_model.fixed.copy()
-    indices = np.array([fe_model.full_index(dof) for dof in reduced_model.expanded_dofs], int)
-    motion[indices] = reduced_model.expansion
+    rows = [row for row, dof in enumerate(reduced_model.expanded_dofs) if isinstance(dof, Dof)]
+    indices = np.array([fe_model.full_index(dof) for dof in node_dofs(reduced_model.expanded_dofs)], np.int64)
+    motion[indices] = reduced_model.expansion[rows]
     known[indices] = True
     return motion, known
 

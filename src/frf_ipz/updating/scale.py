@@ -31,7 +31,7 @@ from frf_ipz.pairing.poles import AMPLITUDE_STD, measured_amplitudes
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.structure import ReducedModel
@@ -150,12 +150,12 @@ class MeasuredScale:
         places = self._sensor(label.output_dof, label.output_channel)
         return self.is_fitted and (self.kind == "common" or bool(places))
 
-    def output_gain(self, dof: Dof) -> float:
+    def output_gain(self, dof: AnyDof) -> float:
         """Give the gain of a sensor.
 
         Parameters
         ----------
-        dof : Dof
+        dof : Dof or PortDof
             Where it sits.
 
         Returns
@@ -165,12 +165,12 @@ class MeasuredScale:
         """
         return self._product(self._sensor(dof, ""))
 
-    def input_gain(self, dof: Dof) -> float:
+    def input_gain(self, dof: AnyDof) -> float:
         """Give the gain of an excitation.
 
         Parameters
         ----------
-        dof : Dof
+        dof : Dof or PortDof
             Where it is.
 
         Returns
@@ -257,7 +257,7 @@ class MeasuredScale:
     def _product(self, places: list[int]) -> float:
         return float(np.prod(self.sign[places]) * np.exp(self.log_gain[places].sum()))
 
-    def _sensor(self, dof: Dof, channel: str) -> list[int]:
+    def _sensor(self, dof: AnyDof, channel: str) -> list[int]:
         """Place of the gain of a sensor; none where it has none of its own."""
         if self.kind != "per_channel":
             return []
@@ -266,7 +266,7 @@ class MeasuredScale:
         name = channel if channel in sensors else next(iter(at_dof), "")
         return [sensors.index(name)] if name in sensors else []
 
-    def _excitation(self, dof: Dof, channel: str) -> list[int]:
+    def _excitation(self, dof: AnyDof, channel: str) -> list[int]:
         """Place of the gain of an excitation: the common one, or its own after those of the sensors."""
         if self.kind != "per_channel":
             return [0] if self.is_fitted else []

@@ -110,7 +110,8 @@ def explain_beam(beam: BeamTest, known: Knowledge, *, progress: Progress = silen
         slope = np.abs(np.gradient(frfs.values, frfs.frequency_hz, axis=0))
         drift = known.drift * frfs.frequency_hz[:, None] * slope
         frfs = replace(frfs, variance=drift**2 + (NOISE * np.abs(frfs.values)) ** 2)
-    others = [index for index, label in enumerate(frfs.labels) if label.output_dof.node != known.left_out]
+    nodes = [frf_ipz.parse_dof(str(label.output_dof)).node for label in frfs.labels]
+    others = [index for index, node in enumerate(nodes) if node != known.left_out]
     problem = pose_beam_problem(replace(beam, frfs=frfs.select_frfs(others)), known)
     fits = add_causes(problem, progress)
     tables = {

@@ -47,7 +47,7 @@ class BeamTest:
 
     def dof(self, label: frf_ipz.FrfLabel) -> frf_ipz.Dof:
         """DOF of the side that is left out."""
-        return label.output_dof if self.side == "output" else label.input_dof
+        return frf_ipz.parse_dof(str(label.output_dof if self.side == "output" else label.input_dof))
 
 
 BANDS_AND_SIDES = {"steel_beam_5x3": ((20.0, 600.0), "output"), "freefree_beam": ((50.0, 1000.0), "input")}

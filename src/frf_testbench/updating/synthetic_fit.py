@@ -23,7 +23,7 @@ from frf_ipz.rational import PoleResidueModel, ZeroSet, damping_ratio, natural_f
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof, Dof
     from frf_ipz.structure import StructuralModel
 
 N_LINES = 800
@@ -44,9 +44,9 @@ class TrueModes:
         self.shapes = shapes[:, : len(self.omega)]
         self.model = model
 
-    def row(self, dof: Dof) -> FloatArray:
+    def row(self, dof: AnyDof) -> FloatArray:
         """Motion of a DOF in every mode, (n,), 1/sqrt(kg)."""
-        return np.asarray(dof.sign * self.shapes[self.model.index(dof)])
+        return np.asarray(self.model.rows([dof]).toarray()[0] @ self.shapes)
 
     def receptance(self, s: ComplexArray, label: FrfLabel) -> ComplexArray:
         """Give the receptance, whatever the label's quantity, (n_lines,), m/N."""

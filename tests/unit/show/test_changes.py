@@ -182,9 +182,9 @@ def test_text_of_others_cannot_break_out_of_its_string():
         ({"kind": "pin", "hz": -3.0}, "is no frequency"),
         ({"kind": "exclude", "low_hz": 9.0, "high_hz": 8.0}, "is no band"),
         ({"kind": "record", "name": "a.csv", "use": "burn"}, "'keep', 'drop' or 'checks'"),
-        ({"kind": "point", "dof": "tip"}, "is no DOF label"),
-        ({"kind": "sensor", "dof": "tip"}, "is no DOF label"),
-        ({"kind": "retain", "dofs": ["9:z", "tip"]}, "is no DOF label"),
+        ({"kind": "point", "dof": "tip:z"}, "is no DOF label"),
+        ({"kind": "sensor", "dof": "tip:z"}, "is no DOF label"),
+        ({"kind": "retain", "dofs": ["9:z", "tip:z"]}, "is no DOF label"),
         ({"kind": "retain", "dofs": []}, "name the DOFs"),
     ],
 )

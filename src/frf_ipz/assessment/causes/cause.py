@@ -12,7 +12,7 @@ from frf_ipz.assessment.causes.modal_comparison import ComputedModes, MeasuredMo
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.structure import StructuralModel
 
 
@@ -96,8 +96,8 @@ class Cause:
     frequency_factor: float = 1.0
     gain: complex | ComplexArray = 1.0
     power: int = 0
-    moved_outputs: Mapping[Dof, Dof] = field(default_factory=dict)
-    moved_inputs: Mapping[Dof, Dof] = field(default_factory=dict)
+    moved_outputs: Mapping[AnyDof, AnyDof] = field(default_factory=dict)
+    moved_inputs: Mapping[AnyDof, AnyDof] = field(default_factory=dict)
     computed: ComputedModes | None = None
     log_prior: float = 0.0
 

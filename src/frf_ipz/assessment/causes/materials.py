@@ -240,7 +240,8 @@ def _rebuilt(cause: Cause, situation: Situation, dimensions: tuple[str, ...], fa
     beam = _resized(file.beam, dimensions, factor)
     sections = tuple(_resized(section, dimensions, factor) for section in beam.section)
     try:
-        model = build_beam(replace(file, beam=replace(beam, section=sections)))
+        nominal = situation.model
+        model = build_beam(replace(file, beam=replace(beam, section=sections))).with_ports(nominal.ports)
         modes = solve_modes(model, n_modes=min(len(situation.computed.frequency_hz) + 3, len(model.dofs)))
     except FrfIpzError:
         return cause

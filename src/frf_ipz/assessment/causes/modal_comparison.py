@@ -21,7 +21,7 @@ from frf_ipz.rational import natural_frequency_hz
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.identification.peaks import FrfPeaks
@@ -71,10 +71,13 @@ class ComputedModes:
     """
 
     frequency_hz: FloatArray
-    shapes: Mapping[Dof, FloatArray]
+    shapes: Mapping[AnyDof, FloatArray]
 
     def products(
-        self, labels: tuple[FrfLabel, ...], moved_outputs: Mapping[Dof, Dof], moved_inputs: Mapping[Dof, Dof]
+        self,
+        labels: tuple[FrfLabel, ...],
+        moved_outputs: Mapping[AnyDof, AnyDof],
+        moved_inputs: Mapping[AnyDof, AnyDof],
     ) -> FloatArray:
         """Give ``phi_output phi_input`` of each mode and FRF.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.assessment.causes.cause import Cause
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import AnyDof, Dof, node_dofs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -109,14 +109,14 @@ def mirrored(situation: Situation) -> Iterator[Cause]:
     for axis in np.flatnonzero(np.ptp(geometry.coordinates_m, axis=0) > 0):
         places = geometry.coordinates_m.copy()
         places[:, axis] = places[:, axis].min() + places[:, axis].max() - places[:, axis]
-        moved = {}
-        for dof in dofs:
+        moved: dict[AnyDof, AnyDof] = {}
+        for dof in node_dofs(dofs):
             at = places[np.flatnonzero(geometry.nodes == dof.node)]
             if not len(at):
                 return
             nearest = int(geometry.nodes[np.argmin(np.linalg.norm(geometry.coordinates_m - at[0], axis=1))])
             moved[dof] = Dof(nearest, dof.direction)
-        if all(place in situation.computed.shapes for place in moved.values()):
+        if moved and all(place in situation.computed.shapes for place in moved.values()):
             says = (
                 f"measured points are counted from the other end along {'xyz'[axis]}, or the model is held at the "
                 "wrong end: turn the numbering, or exchange the supports"
@@ -125,7 +125,7 @@ def mirrored(situation: Situation) -> Iterator[Cause]:
             yield _moved(situation, says, key, moved, moved, 3)
 
 
-def _gain_of_exchange(written: Sequence[Dof], moved: Mapping[Dof, Dof]) -> ComplexArray:
+def _gain_of_exchange(written: Sequence[AnyDof], moved: Mapping[AnyDof, AnyDof]) -> ComplexArray:
     """Give the sign that an exchange leaves in each FRF: dofs are exchanged with their signs."""
     signs = {dof.unsigned: dof.sign for dof in written}
     first, second = (signs[dof] for dof in moved)
@@ -136,8 +136,8 @@ def _moved(
     situation: Situation,
     says: str,
     key: str,
-    outputs: Mapping[Dof, Dof],
-    inputs: Mapping[Dof, Dof],
+    outputs: Mapping[AnyDof, AnyDof],
+    inputs: Mapping[AnyDof, AnyDof],
     count: int,
     *,
     gain: complex | ComplexArray = 1.0,
@@ -153,15 +153,16 @@ def _moved(
     )
 
 
-def _unique(dofs: Iterable[Dof]) -> list[Dof]:
+def _unique(dofs: Iterable[AnyDof]) -> list[AnyDof]:
     return list(dict.fromkeys(dofs))
 
 
-def _channel(situation: Situation, dof: Dof) -> str:
+def _channel(situation: Situation, dof: AnyDof) -> str:
     """Name the channel of a sensor."""
     label = next(label for label in situation.measured.labels if label.output_dof.unsigned == dof)
     return label.output_channel or str(label.output_dof)
 
 
-def _is_along(place: Dof, dof: Dof) -> bool:
-    return place != dof and place.direction == dof.direction
+def _is_along(place: AnyDof, dof: AnyDof) -> bool:
+    are_nodes = isinstance(place, Dof) and isinstance(dof, Dof)
+    return are_nodes and place != dof and place.direction == dof.direction

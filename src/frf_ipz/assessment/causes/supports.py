@@ -40,12 +40,11 @@ def other_supports(situation: Situation) -> Iterator[Cause]:
     for end, place in ENDS.items():
         node = int(situation.model.geometry.nodes[place])
         for condition, held in CONDITIONS.items():
-            model = _with_end(situation.model, node, held)
-            if np.array_equal(model.fixed, situation.model.fixed):
-                continue
-            if not {dof.unsigned for dof in needed} <= set(model.dofs):
-                continue
             try:
+                model = _with_end(situation.model, node, held)
+                if np.array_equal(model.fixed, situation.model.fixed):
+                    continue
+                model.rows(list(needed))  # refuses DOFs that would be held
                 modes = solve_modes(model, n_modes=min(len(situation.computed.frequency_hz) + 2, len(model.dofs)))
             except FrfIpzError:
                 continue

@@ -68,9 +68,8 @@ class ModelContext:
 
     @cached_property
     def directions(self) -> tuple[str, ...]:
-        """Directions of sensors and excited points."""
-        dofs = (*(dof for _, dof in self.layout.outputs), *self.layout.inputs)
-        return tuple(dict.fromkeys(dof.direction for dof in dofs))
+        """Directions of sensors and excited points, and of the DOFs of those that are ports."""
+        return tuple(dict.fromkeys(dof.direction for dof in self.model.dofs_in(self.layout.dofs)))
 
     @cached_property
     def moving_dofs(self) -> tuple[Dof, ...]:

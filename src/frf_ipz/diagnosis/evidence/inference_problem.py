@@ -196,8 +196,7 @@ def pose_problem(
         If the model lacks a DOF that was measured.
     """
     layout = make_layout(source.training.labels)
-    measured_rows = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
-    basis = make_basis(model, 2 * np.pi * band_hz[1], measured_rows)
+    basis = make_basis(model, 2 * np.pi * band_hz[1], layout.dofs)
     nuisance_prior = make_nuisance_prior(basis, layout, options)
     coarse, middle = source.coarse, source.middle
     if free_gains != "none":

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import Matrix
     from frf_ipz.diagnosis.model.change import Change
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.structure import StructuralModel
 
 MODES_UP_TO = 4.0  # times the highest frequency: modes of the basis
@@ -51,8 +52,8 @@ class Basis:
         Of the nominal model; damping is the viscous one of its matrix.
     highest_rad_s : float
         Top of the band.
-    measured_rows : tuple of int
-        Rows of all DOFs where sensors and excited points are.
+    measured : tuple of Dof or PortDof
+        Where sensors and excited points are.
     """
 
     model: StructuralModel
@@ -61,7 +62,7 @@ class Basis:
     stiffness: FloatArray
     damping: FloatArray
     highest_rad_s: float
-    measured_rows: tuple[int, ...]
+    measured: tuple[AnyDof, ...]
 
     @property
     def loaded_shapes(self) -> FloatArray:
@@ -85,7 +86,7 @@ class Basis:
         return np.asarray(self.vectors.T @ multiply(matrix, self.vectors))
 
 
-def make_basis(model: StructuralModel, highest_rad_s: float, measured_rows: Sequence[int]) -> Basis:
+def make_basis(model: StructuralModel, highest_rad_s: float, measured: Sequence[AnyDof]) -> Basis:
     """Find the modes of a model, and the static shapes of its sensors and excited points.
 
     Parameters
@@ -94,8 +95,8 @@ def make_basis(model: StructuralModel, highest_rad_s: float, measured_rows: Sequ
         The nominal model.
     highest_rad_s : float
         Top of the band.
-    measured_rows : sequence of int
-        Rows of all DOFs where sensors and excited points are.
+    measured : sequence of Dof or PortDof
+        Where sensors and excited points are; signs are ignored.
 
     Returns
     -------
@@ -106,8 +107,7 @@ def make_basis(model: StructuralModel, highest_rad_s: float, measured_rows: Sequ
     modes = solve_basis(model) if order < DENSE_ORDER else _solve_lowest_modes(model, highest_rad_s)
     low = max(int(np.count_nonzero(np.sqrt(modes.eigenvalues) <= MODES_UP_TO * highest_rad_s)), min(MIN_MODES, order))
     start = modes.first(low)
-    loads = np.zeros((len(model.all_dofs), len(measured_rows)))
-    loads[list(measured_rows), np.arange(len(measured_rows))] = 1.0
+    loads = model.full_rows([dof.unsigned for dof in measured]).toarray().T
     plain = Basis(
         model=model,
         modes=modes,
@@ -115,7 +115,7 @@ def make_basis(model: StructuralModel, highest_rad_s: float, measured_rows: Sequ
         stiffness=np.diag(start.eigenvalues),
         damping=np.zeros((low, low)),
         highest_rad_s=highest_rad_s,
-        measured_rows=tuple(measured_rows),
+        measured=tuple(measured),
     )
     return _add_shapes(plain, _deflections(plain, loads))
 
@@ -143,7 +143,7 @@ def enrich_basis(basis: Basis, change: Change) -> Basis:
         For this effect at this location.
     """
     if change.model is not None:
-        basis = _exchanged(change.model, basis.highest_rad_s, basis.measured_rows)
+        basis = _exchanged(change.model, basis.highest_rad_s, basis.measured)
     model, loads, shapes = basis.model, [], []
     if change.released:
         constraint = _constraint_shapes(basis, change.released)
@@ -166,8 +166,8 @@ def enrich_basis(basis: Basis, change: Change) -> Basis:
 
 
 @lru_cache(maxsize=2)  # every hypothesis with an exchanged model asks for it
-def _exchanged(model: StructuralModel, highest_rad_s: float, measured_rows: tuple[int, ...]) -> Basis:
-    return make_basis(model, highest_rad_s, measured_rows)
+def _exchanged(model: StructuralModel, highest_rad_s: float, measured: tuple[AnyDof, ...]) -> Basis:
+    return make_basis(model, highest_rad_s, measured)
 
 
 def solve_changed_modes(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
@@ -261,7 +261,7 @@ def _add_shapes(basis: Basis, shapes: FloatArray) -> Basis:
         stiffness=_symmetric(vectors.T @ multiply(model.stiffness_all, vectors)),
         damping=_symmetric(vectors.T @ multiply(model.damping_all, vectors)),
         highest_rad_s=basis.highest_rad_s,
-        measured_rows=basis.measured_rows,
+        measured=basis.measured,
     )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import AnyDof, Dof
 from frf_ipz.fe.beam_models import shear_slope_at, slope_row
 
 if TYPE_CHECKING:
@@ -42,8 +42,8 @@ class Layout:
         Power of s that makes a receptance the measured quantity.
     """
 
-    outputs: tuple[tuple[str, Dof], ...]
-    inputs: tuple[Dof, ...]
+    outputs: tuple[tuple[str, AnyDof], ...]
+    inputs: tuple[AnyDof, ...]
     input_channels: tuple[str, ...]
     output_index: IntArray
     input_index: IntArray
@@ -53,6 +53,11 @@ class Layout:
     def channels(self) -> tuple[str, ...]:
         """All channels, the force first."""
         return tuple(dict.fromkeys((*self.input_channels, *(channel for channel, _ in self.outputs))))
+
+    @property
+    def dofs(self) -> tuple[AnyDof, ...]:
+        """Where sensors are, then excited points."""
+        return (*(dof for _, dof in self.outputs), *self.inputs)
 
     @property
     def gain_signs(self) -> FloatArray:
@@ -98,24 +103,22 @@ def make_layout(labels: Sequence[FrfLabel]) -> Layout:
     )
 
 
-def make_motion_row(model: StructuralModel, dof: Dof) -> FloatArray:
+def make_motion_row(model: StructuralModel, dof: AnyDof) -> FloatArray:
     """Weights of all DOFs in the motion that a sensor at a DOF measures, with its sign.
 
     Parameters
     ----------
     model : StructuralModel
         The model.
-    dof : Dof
+    dof : Dof or PortDof
         The DOF.
 
     Returns
     -------
     (n_all,) array
-        A single entry.
+        A single entry, or the weights of a port.
     """
-    row = np.zeros(len(model.all_dofs))
-    row[model.full_index(dof)] = dof.sign
-    return row
+    return np.asarray(model.full_rows([dof]).toarray()[0])
 
 
 def measure_extents(model: StructuralModel) -> Mapping[str, float]:
@@ -137,14 +140,14 @@ def measure_extents(model: StructuralModel) -> Mapping[str, float]:
     return {axis: float(span) for axis, span in zip(AXES, spans, strict=True) if span > FLAT * spans.max()}
 
 
-def make_shift_rows(model: StructuralModel, dof: Dof) -> dict[str, FloatArray]:
+def make_shift_rows(model: StructuralModel, dof: AnyDof) -> dict[str, FloatArray]:
     """How the motion at a DOF changes with its position.
 
     Parameters
     ----------
     model : StructuralModel
         The model.
-    dof : Dof
+    dof : Dof or PortDof
         Of a sensor or an excited point.
 
     Returns
@@ -152,18 +155,20 @@ def make_shift_rows(model: StructuralModel, dof: Dof) -> dict[str, FloatArray]:
     dict of str to (n_all,) array
         For each axis along which it may be misplaced, weights of all DOFs in the derivative, 1/m.
     """
+    if not isinstance(dof, Dof) or dof.direction not in AXES:
+        return {}  # a port is defined by its weights: it has no place of its own
     axes = [axis for axis in measure_extents(model) if axis != dof.direction]
-    return {axis: dof.sign * _shift_row(model, dof, axis) for axis in axes if dof.direction in AXES}
+    return {axis: dof.sign * _shift_row(model, dof, axis) for axis in axes}
 
 
-def shear_slope_at_force(model: StructuralModel, dof: Dof) -> float:
+def shear_slope_at_force(model: StructuralModel, dof: AnyDof) -> float:
     """How fast the motion falls on both sides of a force, by local shear.
 
     Parameters
     ----------
     model : StructuralModel
         The model.
-    dof : Dof
+    dof : Dof or PortDof
         Of the force.
 
     Returns
@@ -171,7 +176,7 @@ def shear_slope_at_force(model: StructuralModel, dof: Dof) -> float:
     float
         1/N; zero but for beams, where a force makes a corner.
     """
-    if model.kind != "beam" or dof.direction not in AXES:
+    if model.kind != "beam" or not isinstance(dof, Dof) or dof.direction not in AXES:
         return 0.0
     return shear_slope_at(
         model, float(model.geometry.coordinates_m[np.searchsorted(model.geometry.nodes, dof.node), 0])

@@ -6,7 +6,7 @@ scatter then acts on those modes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -188,7 +188,8 @@ def make_motion_rows(basis: Basis, layout: Layout, change: Change, nuisance_prio
         Sensors where the change says they are.
     """
     outputs = tuple(
-        Dof(change.moved.get(channel, dof.node), dof.direction, dof.sign) for channel, dof in layout.outputs
+        replace(dof, node=change.moved.get(channel, dof.node)) if isinstance(dof, Dof) else dof
+        for channel, dof in layout.outputs
     )
     return MotionRows(
         outputs=np.array([make_motion_row(basis.model, dof) for dof in outputs]) @ basis.vectors,

@@ -29,6 +29,7 @@ import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
 from frf_ipz.diagnosis.model.layout import make_motion_row, make_shift_rows, measure_extents, shear_slope_at_force
+from frf_ipz.dofs import Dof
 from frf_ipz.fe.beam_models import with_formulation
 from frf_ipz.fe.eigen import solve_basis
 from frf_ipz.fe.kinds.beam import BeamFile
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.basis import Basis
     from frf_ipz.diagnosis.model.layout import Layout
     from frf_ipz.diagnosis.options import DiagnoseOptions
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
 
 UNIFORM_STD = 1 / np.sqrt(3.0)  # standard deviation of what is uniform between -1 and 1
 OFF_DIAGONAL = 0.5  # kappa and mu between two modes, over those of one: fields average out
@@ -357,14 +358,17 @@ def _local_compliance(basis: Basis, layout: Layout, n_modes: int) -> FloatArray:
 def _corner_compliance(basis: Basis, layout: Layout, shift_std: FloatArray) -> FloatArray:
     """Give the compliance, m/N, by which an FRF may be off where sensor and force meet: it has a corner there."""
     apart = np.sqrt(2.0) * np.linalg.norm(shift_std)  # m, both being misplaced
-    sensors = np.array([dof.node for _, dof in layout.outputs])
-    excited = np.array([dof.node for dof in layout.inputs])
-    meet = sensors[layout.output_index] == excited[layout.input_index]
+    ends = zip(layout.output_index.tolist(), layout.input_index.tolist(), strict=True)
+    meet = [_are_at_one_node(layout.outputs[output][1], layout.inputs[force]) for output, force in ends]
     slopes = np.array([shear_slope_at_force(basis.model, dof) for dof in layout.inputs])
     return np.asarray(np.where(meet, apart * slopes[layout.input_index], 0.0))
 
 
-def make_all_shift_rows(basis: Basis, nuisance_prior: NuisancePrior, dofs: tuple[Dof, ...]) -> FloatArray:
+def _are_at_one_node(output: AnyDof, force: AnyDof) -> bool:
+    return isinstance(output, Dof) and isinstance(force, Dof) and output.node == force.node
+
+
+def make_all_shift_rows(basis: Basis, nuisance_prior: NuisancePrior, dofs: tuple[AnyDof, ...]) -> FloatArray:
     """Make the rows in the basis by which motions change with positions.
 
     Parameters

@@ -15,7 +15,7 @@ from frf_ipz.diagnosis.measured.noise import Noise
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
 
 NOISE_QUANTILE = 0.3  # of a subband of lines: noise between resonances
 QUANTILE_OF_MEAN = 0.42  # that quantile of the mean of a few exponential variables over their mean
@@ -45,7 +45,7 @@ class ChannelNoise:
     """
 
     is_hammer: bool
-    sensors: tuple[tuple[str, Dof], ...]
+    sensors: tuple[tuple[str, AnyDof], ...]
     force: Noise
     responses: tuple[Noise, ...]
     pulse_s: float
@@ -128,7 +128,7 @@ def estimate_decayed_noise(tails: list[FloatArray], step_s: float) -> Noise:
     return Noise(white=white, pink=pink)
 
 
-def _responses_of(observations: Observations, sensor: tuple[str, Dof]) -> list[FloatArray]:
+def _responses_of(observations: Observations, sensor: tuple[str, AnyDof]) -> list[FloatArray]:
     return [
         row
         for record in observations.records

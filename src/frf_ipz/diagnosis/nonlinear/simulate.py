@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.model.time_stepping import TimeHistory
     from frf_ipz.diagnosis.nonlinear.segments import SegmentSet
     from frf_ipz.diagnosis.observations import Observations
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -150,7 +150,7 @@ def _step_records(
     return time_response, step_in_time(fit.law, numbers, compliance, *time_response.motion_without_law())
 
 
-def _sensor_keys(modal_model: ModalModel) -> list[tuple[str, Dof]]:
+def _sensor_keys(modal_model: ModalModel) -> list[tuple[str, AnyDof]]:
     return [(sensor.channel, sensor.dof) for sensor in modal_model.sensors]
 
 

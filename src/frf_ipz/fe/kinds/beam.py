@@ -13,7 +13,7 @@ from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.assembly import assemble_mass_and_stiffness, stated_damping
 from frf_ipz.fe.beam_elements import BeamElements, mass_matrices, shear_coefficient, stiffness_matrices
-from frf_ipz.fe.model_options import DampingSection, ModelSection
+from frf_ipz.fe.model_options import DampingSection, ModelSection, PortSection
 from frf_ipz.option_types import Count, Node, NotNegative, Positive
 from frf_ipz.structure import Geometry, Part, StructuralModel
 from frf_ipz.toml_files import STRICT, to_options
@@ -184,6 +184,8 @@ class BeamFile:
         ``[beam]``.
     damping : DampingSection, optional
         ``[damping]``.
+    port : tuple of PortSection
+        ``[[port]]``.
     """
 
     __pydantic_config__ = STRICT
@@ -191,6 +193,7 @@ class BeamFile:
     model: ModelSection
     beam: BeamOptions
     damping: DampingSection | None = None
+    port: tuple[PortSection, ...] = ()
 
 
 FILE = BeamFile

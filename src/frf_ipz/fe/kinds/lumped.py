@@ -11,7 +11,7 @@ import numpy as np
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.assembly import assemble, assemble_mass_and_stiffness, stated_damping
-from frf_ipz.fe.model_options import DampingSection, ModelSection
+from frf_ipz.fe.model_options import DampingSection, ModelSection, PortSection
 from frf_ipz.option_types import Name, Node, NodeOrGround, NotNegative, Positive
 from frf_ipz.structure import Geometry, Part, StructuralModel
 from frf_ipz.toml_files import STRICT
@@ -101,6 +101,8 @@ class LumpedFile:
         ``[lumped]``.
     damping : DampingSection, optional
         ``[damping]``.
+    port : tuple of PortSection
+        ``[[port]]``.
     """
 
     __pydantic_config__ = STRICT
@@ -108,6 +110,7 @@ class LumpedFile:
     model: ModelSection
     lumped: LumpedOptions
     damping: DampingSection | None = None
+    port: tuple[PortSection, ...] = ()
 
 
 FILE = LumpedFile

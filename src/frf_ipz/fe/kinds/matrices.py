@@ -17,7 +17,7 @@ from frf_ipz.fe.matrices.node_positions import read_positions
 from frf_ipz.fe.matrices.registry import read_matrix
 from frf_ipz.fe.matrices.row_tables import read_rows
 from frf_ipz.fe.matrices.stored import MatrixRequest, StoredMatrix
-from frf_ipz.fe.model_options import DampingSection, ModelSection
+from frf_ipz.fe.model_options import DampingSection, ModelSection, PortSection
 from frf_ipz.numerics.structural_matrices import MatrixOptions, ModelMatrices
 from frf_ipz.option_types import Name
 from frf_ipz.structure import Part, StructuralModel, drawn_geometry
@@ -122,6 +122,8 @@ class MatricesFile:
         ``[matrices]``.
     damping : DampingSection, optional
         ``[damping]``.
+    port : tuple of PortSection
+        ``[[port]]``.
     """
 
     __pydantic_config__ = STRICT
@@ -129,6 +131,7 @@ class MatricesFile:
     model: ModelSection
     matrices: MatricesOptions
     damping: DampingSection | None = None
+    port: tuple[PortSection, ...] = ()
 
 
 FILE = MatricesFile

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.dofs import Dof, parse_dof
+from frf_ipz.dofs import AnyDof, parse_label
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,10 +38,10 @@ class ReductionPlan:
         Number of modes, where the user gives it.
     """
 
-    required: tuple[Dof, ...]
-    residual: tuple[Dof, ...]
+    required: tuple[AnyDof, ...]
+    residual: tuple[AnyDof, ...]
     residual_is_given: bool
-    dofs: tuple[Dof, ...]
+    dofs: tuple[AnyDof, ...]
     modes: int | None
 
 
@@ -49,9 +49,9 @@ def plan_reduction(
     model: StructuralModel,
     options: ReduceOptions,
     *,
-    actuators: Sequence[Dof],
-    sensors: Sequence[Dof],
-    points: Sequence[Dof],
+    actuators: Sequence[AnyDof],
+    sensors: Sequence[AnyDof],
+    points: Sequence[AnyDof],
 ) -> ReductionPlan:
     """Combine test and options, and check that they fit the model and each other.
 
@@ -86,19 +86,18 @@ def plan_reduction(
         dofs=_parse_dofs(options.dofs, "dofs"),
         modes=options.modes,
     )
-    for dof in (*plan.required, *plan.residual, *plan.dofs):
-        model.index(dof)
+    model.rows((*plan.required, *plan.residual, *plan.dofs))
     _require_counts(plan, model)
     return plan
 
 
-def _damped_dofs(model: StructuralModel) -> tuple[Dof, ...]:
+def _damped_dofs(model: StructuralModel) -> tuple[AnyDof, ...]:
     """DOFs on which dampers act: their forces bend the shapes in a way that undamped modes alone do not follow."""
     damped = np.flatnonzero(model.damping.diagonal())
     return tuple(model.dofs[row] for row in damped.tolist()) if len(damped) <= MAX_DAMPED else ()
 
 
-def unsigned(dofs: Sequence[Dof]) -> tuple[Dof, ...]:
+def unsigned(dofs: Sequence[AnyDof]) -> tuple[AnyDof, ...]:
     """List each DOF once, in the positive direction.
 
     Parameters
@@ -114,8 +113,8 @@ def unsigned(dofs: Sequence[Dof]) -> tuple[Dof, ...]:
     return tuple(dict.fromkeys(dof.unsigned for dof in dofs))
 
 
-def _parse_dofs(labels: Sequence[str], key: str) -> tuple[Dof, ...]:
-    dofs = tuple(parse_dof(label).unsigned for label in labels)
+def _parse_dofs(labels: Sequence[str], key: str) -> tuple[AnyDof, ...]:
+    dofs = tuple(parse_label(label).unsigned for label in labels)
     for index, dof in enumerate(dofs):
         if dof in dofs[:index]:
             raise InputError(f"[reduce] {key} names the DOF {dof.name} twice; name it once")

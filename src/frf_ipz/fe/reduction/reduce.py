@@ -18,7 +18,7 @@ from scipy import linalg
 
 from frf_ipz.arguments import require_type
 from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.dofs import GENERALISED, TRANSLATIONS, Dof, as_dofs
+from frf_ipz.dofs import GENERALISED, TRANSLATIONS, AnyDof, as_dofs
 from frf_ipz.errors import IllConditionedError, InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.changes import with_default_damping
@@ -47,7 +47,7 @@ def reduce_model(
     measured: Measured,
     fe_model: StructuralModel,
     *,
-    points: Sequence[Dof | str] = (),
+    points: Sequence[AnyDof | str] = (),
     options: ReduceOptions | None = None,
     default_damping_ratio: float | None = None,
 ) -> ReducedModel:
@@ -108,9 +108,9 @@ def reduce_to_dofs(
     model: StructuralModel,
     *,
     options: ReduceOptions | None = None,
-    actuators: Sequence[Dof],
-    sensors: Sequence[Dof],
-    points: Sequence[Dof],
+    actuators: Sequence[AnyDof],
+    sensors: Sequence[AnyDof],
+    points: Sequence[AnyDof],
     band_hz: tuple[float, float],
     default_damping_ratio: float | None = None,
 ) -> ReducedModel:
@@ -171,13 +171,26 @@ def reduce_to_dofs(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Ritz:
-    """Basis of modes and residual vectors, mass- and stiffness-orthogonal."""
+    """Basis of modes and residual vectors, mass- and stiffness-orthogonal; `motions` has a row for each of `dofs`.
+
+    These are the free DOFs, then the ports: a port may be retained like a DOF.
+    """
 
     eigenvalues: FloatArray
     shapes: FloatArray
     n_modes: int
     n_rigid: int
-    residual: tuple[Dof, ...]
+    residual: tuple[AnyDof, ...]
+    dofs: tuple[AnyDof, ...]
+    motions: FloatArray
+
+    def structural_rows(self) -> IntArray:
+        """Rows of motions at nodes and of ports, without generalised DOFs."""
+        return np.array([row for row, dof in enumerate(self.dofs) if dof.direction != GENERALISED], dtype=np.int64)
+
+    def places(self, dofs: Sequence[AnyDof]) -> list[int]:
+        place_of = {dof: place for place, dof in enumerate(self.dofs)}
+        return [place_of[dof] for dof in dofs]
 
 
 def _solve_retained_modes(
@@ -191,7 +204,7 @@ def _solve_retained_modes(
         notes.append(f"modes: {count}, as many as dofs and residual vectors need")
         return solve_basis(model, n_modes=count)
     basis = solve_basis(model, up_to_hz=BAND_MARGIN * band_hz[1])
-    at_nodes = len(_structural_rows(model))
+    at_nodes = sum(dof.direction != GENERALISED for dof in model.dofs)
     if at_nodes < len(model.dofs):
         order = min(order, max(at_nodes - len(plan.residual), 1))
     if order < len(basis.eigenvalues):
@@ -218,31 +231,35 @@ def _with_residual_vectors(model: StructuralModel, basis: ModalBasis, plan: Redu
         stiffness, mass = (vectors.T @ multiply(matrix, vectors) for matrix in (basis.stiffness, basis.mass))
         eigenvalues, axes = linalg.eigh(stiffness, mass)
         vectors = vectors @ axes
+    shapes, ports = np.column_stack([basis.shapes, vectors]), tuple(model.port_dofs)
     return _Ritz(
         eigenvalues=np.concatenate([basis.eigenvalues, eigenvalues]),
-        shapes=np.column_stack([basis.shapes, vectors]),
+        shapes=shapes,
+        dofs=(*model.dofs, *ports),
+        motions=np.vstack([shapes, np.asarray(model.rows(ports) @ shapes)]) if ports else shapes,
         n_modes=len(basis.eigenvalues),
         n_rigid=basis.n_rigid,
         residual=tuple(residual_dofs),
     )
 
 
-def _residual_vectors(model: StructuralModel, basis: ModalBasis, plan: ReductionPlan) -> tuple[FloatArray, list[Dof]]:
+def _residual_vectors(
+    model: StructuralModel, basis: ModalBasis, plan: ReductionPlan
+) -> tuple[FloatArray, list[AnyDof]]:
     """Residual flexibility at DOFs where modes and the vectors before do not hold all of it; columns of unit mass."""
-    rows = [model.index(dof) for dof in plan.residual]
-    loads = np.zeros((len(basis.shapes), len(rows)))
-    loads[rows, np.arange(len(rows))] = 1.0
+    rows = model.rows(plan.residual)
+    loads = rows.toarray().T
     elastic = slice(basis.n_rigid, None)
-    in_modes = np.sum(basis.shapes[rows, elastic] ** 2 / basis.eigenvalues[elastic], 1)
+    in_modes = np.sum(np.asarray(rows @ basis.shapes[:, elastic]) ** 2 / basis.eigenvalues[elastic], 1)
     max_count = model.n_modes - len(basis.eigenvalues)
     deflections = basis.residual_flexibility(loads) if max_count else np.zeros_like(loads)
     vectors = np.zeros((len(basis.shapes), 0))
-    residual_dofs: list[Dof] = []
-    for column, (dof, row) in enumerate(zip(plan.residual, rows, strict=True)):
+    residual_dofs: list[AnyDof] = []
+    for column, (dof, load) in enumerate(zip(plan.residual, loads.T, strict=True)):
         rest = deflections[:, column] - vectors @ (vectors.T @ multiply(basis.mass, deflections[:, column]))
         size = float(np.sqrt(rest @ multiply(basis.mass, rest)))
-        flexibility = abs(deflections[row, column])
-        is_new = flexibility > NO_FLEXIBILITY * in_modes[column] and abs(rest[row]) > NO_FLEXIBILITY * flexibility
+        flexibility = abs(load @ deflections[:, column])
+        is_new = flexibility > NO_FLEXIBILITY * in_modes[column] and abs(load @ rest) > NO_FLEXIBILITY * flexibility
         if is_new and len(residual_dofs) < max_count and size > 0:
             vectors, residual_dofs = np.column_stack([vectors, rest / size]), [*residual_dofs, dof]
         elif plan.residual_is_given:
@@ -261,59 +278,54 @@ def _retained_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan, not
                 f"[reduce] dofs names {len(plan.dofs)} DOFs, but there are {ritz.n_modes} modes and "
                 f"{len(ritz.residual)} residual vectors; name {count}, or omit dofs"
             )
-        rows = np.array([model.index(dof) for dof in plan.dofs])
-        _require_condition(model, ritz, rows, plan)
+        rows = np.array(ritz.places(plan.dofs))
+        _require_condition(ritz, rows, plan)
     else:
-        rows = _chosen_rows(model, ritz, plan)
-        if condition_number(ritz.shapes[rows]) > MAX_CONDITION:
+        rows = _chosen_rows(ritz, plan)
+        if condition_number(ritz.motions[rows]) > MAX_CONDITION:
             raise IllConditionedError(
                 f"{count} modes and residual vectors cannot be distinguished at any DOFs of the model '{model.name}'; "
                 "use fewer ([reduce] modes)"
             )
-        notes.append("dofs: " + ", ".join(model.dofs[row].name for row in rows.tolist()))
-    retained = {model.dofs[row] for row in rows.tolist()}
+        notes.append("dofs: " + ", ".join(ritz.dofs[row].name for row in rows.tolist()))
+    retained = {ritz.dofs[row] for row in rows.tolist()}
     expanded = [dof.name for dof in plan.required if dof not in retained]
     if expanded:
         notes.append(f"dofs: {', '.join(expanded)} are not retained, but follow from the retained ones")
     return rows
 
 
-def _chosen_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan) -> IntArray:
+def _chosen_rows(ritz: _Ritz, plan: ReductionPlan) -> IntArray:
     """Choose actuators, sensors, points and translations; rotations only where translations do not separate modes."""
-    dofs = model.dofs
-    required, count = [model.index(dof) for dof in plan.required], ritz.shapes.shape[1]
-    translations = np.array([row for row, dof in enumerate(dofs) if dof.direction in TRANSLATIONS], dtype=np.int64)
+    motions = ritz.motions
+    required, count = ritz.places(plan.required), ritz.shapes.shape[1]
+    structural = ritz.structural_rows()
+    structural = structural[structural < len(ritz.shapes)]  # ports that no one asks for are no candidates
+    translations = structural[[ritz.dofs[row].direction in TRANSLATIONS for row in structural.tolist()]]
     if translations.size >= count:
-        rows = choose_retained_rows(ritz.shapes, required, translations, count)
-        if condition_number(ritz.shapes[rows]) <= MAX_CONDITION:
+        rows = choose_retained_rows(motions, required, translations, count)
+        if condition_number(motions[rows]) <= MAX_CONDITION:
             return rows
     # rotations have another unit: only the directions of the rows can be compared
-    lengths = np.linalg.norm(ritz.shapes, axis=1, keepdims=True)
-    return choose_retained_rows(
-        ritz.shapes / np.where(lengths > 0, lengths, 1.0), required, _structural_rows(model), count
-    )
+    lengths = np.linalg.norm(motions, axis=1, keepdims=True)
+    return choose_retained_rows(motions / np.where(lengths > 0, lengths, 1.0), required, structural, count)
 
 
-def _structural_rows(model: StructuralModel) -> IntArray:
-    """Rows of motions at nodes, without generalised DOFs."""
-    return np.array([row for row, dof in enumerate(model.dofs) if dof.direction != GENERALISED], dtype=np.int64)
-
-
-def _require_condition(model: StructuralModel, ritz: _Ritz, rows: IntArray, plan: ReductionPlan) -> None:
-    condition = condition_number(ritz.shapes[rows])
+def _require_condition(ritz: _Ritz, rows: IntArray, plan: ReductionPlan) -> None:
+    condition = condition_number(ritz.motions[rows])
     if condition > MAX_CONDITION:
-        better = _chosen_rows(model, ritz, plan)
-        names = ", ".join(f'"{model.dofs[row].name}"' for row in better.tolist())
+        better = _chosen_rows(ritz, plan)
+        names = ", ".join(f'"{ritz.dofs[row].name}"' for row in better.tolist())
         raise IllConditionedError(
             f"[reduce] dofs: the modes can hardly be distinguished at these DOFs (condition number {condition:.2g}, at "
-            f"most {MAX_CONDITION:g}); better is dofs = [{names}] ({condition_number(ritz.shapes[better]):.2g})"
+            f"most {MAX_CONDITION:g}); better is dofs = [{names}] ({condition_number(ritz.motions[better]):.2g})"
         )
 
 
 def _reduced_model(
     model: StructuralModel, ritz: _Ritz, rows: IntArray, plan: ReductionPlan, notes: tuple[str, ...]
 ) -> ReducedModel:
-    inverse = linalg.inv(ritz.shapes[rows])
+    inverse = linalg.inv(ritz.motions[rows])
     omega = np.sqrt(np.abs(ritz.eigenvalues))
     negative = ritz.eigenvalues < 0
     mass, stiffness = _gram(inverse), _gram(np.where(negative, 0.0, omega)[:, None] * inverse)
@@ -325,11 +337,11 @@ def _reduced_model(
     viscous = ritz.shapes.T @ multiply(model.damping, ritz.shapes)
     dashpots = inverse.T @ ((viscous + viscous.T) / 2) @ inverse
     damping = _gram(np.sqrt(rates)[:, None] * inverse) + dashpots
-    rigid = ritz.shapes[rows][:, ritz.eigenvalues == 0]
+    rigid = ritz.motions[rows][:, ritz.eigenvalues == 0]
     states_both = np.any(rates) and np.any(viscous)
-    dofs = model.dofs
-    expanded = _structural_rows(model) if len(dofs) <= MAX_EXPANDED else _required_rows(model, rows, plan, ritz)
-    expansion = np.asarray(ritz.shapes[expanded] @ inverse)
+    dofs = ritz.dofs
+    expanded = ritz.structural_rows() if len(model.dofs) <= MAX_EXPANDED else _required_rows(rows, plan, ritz)
+    expansion = np.asarray(ritz.motions[expanded] @ inverse)
     return ReducedModel(
         mass=mass,
         damping=(damping + damping.T) / 2,
@@ -345,9 +357,10 @@ def _reduced_model(
     )
 
 
-def _required_rows(model: StructuralModel, rows: IntArray, plan: ReductionPlan, ritz: _Ritz) -> IntArray:
-    required = [model.index(dof) for dof in (*plan.required, *ritz.residual)]
-    return np.unique(np.concatenate([rows, np.array(required, dtype=np.int64)]))
+def _required_rows(rows: IntArray, plan: ReductionPlan, ritz: _Ritz) -> IntArray:
+    required = ritz.places((*plan.required, *ritz.residual))
+    ports = np.arange(len(ritz.shapes), len(ritz.motions))
+    return np.unique(np.concatenate([rows, np.array(required, dtype=np.int64), ports]))
 
 
 def _require_modes(mass: FloatArray, stiffness: FloatArray, ritz: _Ritz) -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.arrays import BoolArray, ComplexArray
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.modal_fit import ModalFit
 
@@ -57,7 +57,7 @@ def mode_shapes(fit: ModalFit) -> ModeSet:
     )
 
 
-def driving_points(labels: Sequence[FrfLabel]) -> tuple[Dof, ...]:
+def driving_points(labels: Sequence[FrfLabel]) -> tuple[AnyDof, ...]:
     """Name the DOFs at which force and response were measured together.
 
     Parameters
@@ -96,7 +96,7 @@ def product_factors(fit: ModalFit) -> ComplexArray:
 
 
 def _residue_matrices(
-    fit: ModalFit, poles: ComplexArray, outputs: tuple[Dof, ...], inputs: tuple[Dof, ...]
+    fit: ModalFit, poles: ComplexArray, outputs: tuple[AnyDof, ...], inputs: tuple[AnyDof, ...]
 ) -> tuple[ComplexArray, BoolArray]:
     """Give 2 i omega_d times the receptances' residues, (n_modes, n_outputs, n_inputs), and what was measured."""
     matrices = np.zeros((len(poles), len(outputs), len(inputs)), complex)
@@ -126,9 +126,9 @@ def _positive_or_infinite(values: np.ndarray) -> np.ndarray:
 def _scaled_at_driving_points(
     at_outputs: ComplexArray,
     at_inputs: ComplexArray,
-    outputs: tuple[Dof, ...],
-    inputs: tuple[Dof, ...],
-    driving: list[Dof],
+    outputs: tuple[AnyDof, ...],
+    inputs: tuple[AnyDof, ...],
+    driving: list[AnyDof],
 ) -> tuple[ComplexArray, ComplexArray]:
     """Share the size between the two vectors so that they agree at the driving points."""
     output_values = np.array([at_outputs[outputs.index(dof)] for dof in driving])
@@ -142,9 +142,9 @@ def _scaled_at_driving_points(
 def _normalised(
     at_outputs: ComplexArray,
     at_inputs: ComplexArray,
-    outputs: tuple[Dof, ...],
-    inputs: tuple[Dof, ...],
-    dofs: tuple[Dof, ...],
+    outputs: tuple[AnyDof, ...],
+    inputs: tuple[AnyDof, ...],
+    dofs: tuple[AnyDof, ...],
     *,
     keep_size: bool,
 ) -> ComplexArray:

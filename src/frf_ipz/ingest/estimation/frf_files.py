@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arguments import require_file
-from frf_ipz.dofs import Dof, as_direction, as_dof
+from frf_ipz.dofs import Dof, PortDof, as_direction, as_dof
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.frf import FrfSet
 from frf_ipz.ingest.estimation.record_table import empty_record_table
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from frf_ipz.arrays import FloatArray, IntArray
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.formats.frf_file import MeasuredFrf
@@ -95,11 +96,17 @@ def read_frf_levels(test: VibrationTest) -> dict[float, FrfSet]:
 
 def _read_by_level(test: VibrationTest, progress: Progress = silent) -> dict[float, list[MeasuredFrf]]:
     """Read all FRFs by ascending level; 0 for those that state none."""
+    known = {label: label for label in test.labels}  # with the units of ports
     frfs: dict[float, list[MeasuredFrf]] = {}
     for position, source in enumerate(test.frf_sources):
         progress(position / len(test.frf_sources), f"reading {source.path.name}")
         of_level = frfs.setdefault(source.level_N or 0.0, [])
-        of_level += [_to_si(frf) for frf in read_frf_source(source) if frf.label in test.labels]
+        read = ((frf, known.get(frf.label)) for frf in read_frf_source(source))
+        of_level += [
+            _to_si(replace(frf, output_dof=label.output_dof, input_dof=label.input_dof))
+            for frf, label in read
+            if label is not None
+        ]
     for level, of_level in frfs.items():
         _check_frfs(of_level, others=frfs.get(0.0, ()) if level else ())
     return dict(sorted(frfs.items()))
@@ -133,8 +140,8 @@ def read_frfs(
     *,
     quantity: FrfQuantity | str = FrfQuantity.ACCELERANCE,
     unit: str = "",
-    output: Dof | str | Sequence[Dof | str] | None = None,
-    input: Dof | str | Sequence[Dof | str] | None = None,
+    output: AnyDof | str | Sequence[AnyDof | str] | None = None,
+    input: AnyDof | str | Sequence[AnyDof | str] | None = None,
     columns: Sequence[str] = (),
     skip_rows: int = 0,
     direction: str = "",
@@ -207,10 +214,10 @@ def read_frfs(
     return _join(frfs)[0]
 
 
-def _as_dofs(dofs: Dof | str | Sequence[Dof | str] | None) -> tuple[Dof, ...]:
+def _as_dofs(dofs: AnyDof | str | Sequence[AnyDof | str] | None) -> tuple[AnyDof, ...]:
     if dofs is None:
         return ()
-    return (as_dof(dofs),) if isinstance(dofs, (Dof, str)) else tuple(map(as_dof, dofs))
+    return (as_dof(dofs),) if isinstance(dofs, Dof | PortDof | str) else tuple(map(as_dof, dofs))
 
 
 def _join(frfs: Sequence[MeasuredFrf]) -> tuple[FrfSet, tuple[str, ...]]:

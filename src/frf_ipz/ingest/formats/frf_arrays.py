@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.dofs import Dof, parse_dof
+from frf_ipz.dofs import AnyDof, Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, did_you_mean
 from frf_ipz.ingest.formats.file_arrays import FileArrays, describe, last_part
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
@@ -64,7 +64,7 @@ class FrfBlock:
     name: str
     frequency_hz: FloatArray
     values: ComplexArray
-    ends: Sequence[tuple[Dof, Dof]] | None = None
+    ends: Sequence[tuple[AnyDof, AnyDof]] | None = None
     coherence: FloatArray | None = None
     variance: FloatArray | None = None
     unit: str = ""
@@ -326,7 +326,7 @@ def _find_frequencies(
     return next(iter(vectors.items())) if len(vectors) == 1 else None
 
 
-def _ends_beside(arrays: FileArrays, name: str, shape: tuple[int, ...]) -> list[tuple[Dof, Dof]] | None:
+def _ends_beside(arrays: FileArrays, name: str, shape: tuple[int, ...]) -> list[tuple[AnyDof, AnyDof]] | None:
     """Read what FRFs connect from lists of DOFs in the same place."""
     way = name[: -len(last_part(name))]
     lists = []
@@ -342,7 +342,9 @@ def _ends_beside(arrays: FileArrays, name: str, shape: tuple[int, ...]) -> list[
     return _pairs(outputs, inputs, shape)
 
 
-def _pairs(outputs: Sequence[Dof], inputs: Sequence[Dof], shape: tuple[int, ...]) -> list[tuple[Dof, Dof]] | None:
+def _pairs(
+    outputs: Sequence[AnyDof], inputs: Sequence[AnyDof], shape: tuple[int, ...]
+) -> list[tuple[AnyDof, AnyDof]] | None:
     """Match DOFs with the axes of FRFs, output by output; or FRF by FRF where there is one axis for both."""
     n_outputs, n_inputs = shape
     if (len(outputs), len(inputs)) == (n_outputs, n_inputs):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyarrow as pa
 
-from frf_ipz.dofs import Dof, parse_dof
+from frf_ipz.dofs import AnyDof, parse_label
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import TextLayout, sniff
@@ -69,14 +69,14 @@ def _read_table(layout: TextLayout, names: tuple[str, ...]) -> pa.Table:
     return table
 
 
-def _parse_dof(layout: TextLayout, text: str) -> Dof:
+def _parse_dof(layout: TextLayout, text: str) -> AnyDof:
     try:
-        return parse_dof(text)
+        return parse_label(text)
     except InputError as error:
         raise FileFormatError(layout.path, str(error), where="column 'output_dof' or 'input_dof'") from None
 
 
-def _make_frf(source: FrfSource, output_dof: Dof, input_dof: Dof, columns: dict[str, FloatArray]) -> MeasuredFrf:
+def _make_frf(source: FrfSource, output_dof: AnyDof, input_dof: AnyDof, columns: dict[str, FloatArray]) -> MeasuredFrf:
     left_out = undefined_at_rest({name: columns[name] for name in NUMBERS})
     columns = {name: values[~left_out] for name, values in columns.items()}
     order = np.argsort(columns["frequency_hz"], kind="stable")

@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import AnyDof
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
 
@@ -26,7 +26,7 @@ class FrfSource:
         What its FRFs are.
     unit : str
         Unit of the values; empty for what the file says, or SI.
-    output_dofs, input_dofs : tuple of Dof
+    output_dofs, input_dofs : tuple of AnyDof
         What the FRFs connect where the file does not say so: one each for a single FRF.
     columns : tuple of str
         What the columns of a text file are.
@@ -47,8 +47,8 @@ class FrfSource:
     path: Path
     quantity: FrfQuantity
     unit: str = ""
-    output_dofs: tuple[Dof, ...] = ()
-    input_dofs: tuple[Dof, ...] = ()
+    output_dofs: tuple[AnyDof, ...] = ()
+    input_dofs: tuple[AnyDof, ...] = ()
     columns: tuple[str, ...] = ()
     skip_rows: int = 0
     direction: str = ""
@@ -58,12 +58,12 @@ class FrfSource:
     variables: tuple[tuple[str, str], ...] = ()
 
     @property
-    def output_dof(self) -> Dof | None:
+    def output_dof(self) -> AnyDof | None:
         """The one output, where there is one."""
         return self.output_dofs[0] if len(self.output_dofs) == 1 else None
 
     @property
-    def input_dof(self) -> Dof | None:
+    def input_dof(self) -> AnyDof | None:
         """The one input, where there is one."""
         return self.input_dofs[0] if len(self.input_dofs) == 1 else None
 
@@ -76,7 +76,7 @@ class FrfContents:
     ----------
     n_outputs, n_inputs : int
         How many.
-    ends : tuple of pairs of Dof
+    ends : tuple of pairs of AnyDof
         What each FRF connects; empty where the file does not say.
     quantity : FrfQuantity, optional
         Where the file says it.
@@ -90,7 +90,7 @@ class FrfContents:
 
     n_outputs: int
     n_inputs: int
-    ends: tuple[tuple[Dof, Dof], ...] = ()
+    ends: tuple[tuple[AnyDof, AnyDof], ...] = ()
     quantity: FrfQuantity | None = None
     unit: str = ""
     about: str = ""
@@ -105,7 +105,7 @@ class MeasuredFrf:
     ----------
     source : FrfSource
         Where it comes from.
-    output_dof, input_dof : Dof
+    output_dof, input_dof : Dof or PortDof
         What it connects.
     frequency_hz : (n_lines,) array
         Ascending, Hz.
@@ -120,8 +120,8 @@ class MeasuredFrf:
     """
 
     source: FrfSource
-    output_dof: Dof
-    input_dof: Dof
+    output_dof: AnyDof
+    input_dof: AnyDof
     frequency_hz: FloatArray
     values: ComplexArray
     unit: str = ""
@@ -135,12 +135,12 @@ class MeasuredFrf:
         return frf_label(self.output_dof, self.input_dof, self.source.quantity)
 
 
-def frf_label(output_dof: Dof, input_dof: Dof, quantity: FrfQuantity) -> FrfLabel:
+def frf_label(output_dof: AnyDof, input_dof: AnyDof, quantity: FrfQuantity) -> FrfLabel:
     """Name an FRF that was estimated elsewhere; its channels are called after its DOFs.
 
     Parameters
     ----------
-    output_dof, input_dof : Dof
+    output_dof, input_dof : Dof or PortDof
         What it connects.
     quantity : FrfQuantity
         What it is.
@@ -237,14 +237,14 @@ def undefined_at_rest(columns: dict[str, FloatArray]) -> BoolArray:
     return np.asarray(~is_finite & (columns["frequency_hz"] == 0.0))
 
 
-def note_at_rest(source: FrfSource, output_dof: Dof, input_dof: Dof, left_out: BoolArray) -> tuple[str, ...]:
+def note_at_rest(source: FrfSource, output_dof: AnyDof, input_dof: AnyDof, left_out: BoolArray) -> tuple[str, ...]:
     """Say that the line at 0 Hz is left out.
 
     Parameters
     ----------
     source : FrfSource
         The file.
-    output_dof, input_dof : Dof
+    output_dof, input_dof : Dof or PortDof
         What the FRF connects.
     left_out : (n_lines,) bool array
         Lines that are.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import AnyDof, Dof
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest
 from frf_ipz.ingest.formats.universal_file import (
@@ -189,7 +189,7 @@ def _abscissa_factor(source: FrfSource, function: UniversalFunction) -> float:
 
 
 def _find_unit(
-    source: FrfSource, function: UniversalFunction, output_dof: Dof, input_dof: Dof
+    source: FrfSource, function: UniversalFunction, output_dof: AnyDof, input_dof: AnyDof
 ) -> tuple[str, tuple[str, ...]]:
     """Return the unit that the file states: by its labels, else by its factors from SI; never SI against a label."""
     if source.unit:
@@ -221,7 +221,7 @@ def _find_unit(
     raise QuantityError(f"{where}: the unit {stated} cannot be used: the {expected}; {way_out}")
 
 
-def _unit_of_factors(source: FrfSource, function: UniversalFunction, output_dof: Dof, input_dof: Dof) -> str:
+def _unit_of_factors(source: FrfSource, function: UniversalFunction, output_dof: AnyDof, input_dof: AnyDof) -> str:
     if function.units is None:
         return ""
     length, force = function.units

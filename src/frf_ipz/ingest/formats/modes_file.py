@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import AnyDof
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.modes import ModalParameters
 from frf_ipz.quantities import FrfQuantity
@@ -27,7 +27,7 @@ class ModesSource:
     """
 
     path: Path
-    input_dofs: tuple[Dof, ...] = ()
+    input_dofs: tuple[AnyDof, ...] = ()
     quantity: FrfQuantity = FrfQuantity.ACCELERANCE
 
 

@@ -17,7 +17,7 @@ from frf_ipz.visible_text import one_line
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.pipeline.inputs import PipelineInputs
 
 FITS = "Everything fits together. Nothing was run."
@@ -94,5 +94,5 @@ def _toml_files(inputs: PipelineInputs) -> list[Path]:
     return [Path(name) for name in dict.fromkeys(names) if name.endswith(".toml") and Path(name).is_file()]
 
 
-def _names(dofs: Iterable[Dof]) -> str:
+def _names(dofs: Iterable[AnyDof]) -> str:
     return " ".join(str(dof) for dof in dofs) or "none"

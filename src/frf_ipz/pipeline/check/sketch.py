@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.dofs import node_dofs
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.structure import Geometry
 
 WIDTH = 72
@@ -19,7 +21,9 @@ MARKS = {"node": "-", "support": "#", "sensor": "S", "input": "F", "both": "X", 
 FLAT = 1e-6  # of the largest extent: a structure thinner than this is a line
 
 
-def draw(geometry: Geometry, sensors: Iterable[Dof], inputs: Iterable[Dof], points: Iterable[Dof]) -> list[str]:
+def draw(
+    geometry: Geometry, sensors: Iterable[AnyDof], inputs: Iterable[AnyDof], points: Iterable[AnyDof]
+) -> list[str]:
     """Draw a structure in characters.
 
     Parameters
@@ -37,11 +41,11 @@ def draw(geometry: Geometry, sensors: Iterable[Dof], inputs: Iterable[Dof], poin
     columns, rows = _places(geometry.coordinates_m)
     canvas = [[" "] * WIDTH for _ in range(int(rows.max()) + 1)]
     place = {int(node): index for index, node in enumerate(geometry.nodes)}
-    excited, sensed = {dof.node for dof in inputs}, {dof.node for dof in sensors}
+    excited, sensed = {dof.node for dof in node_dofs(inputs)}, {dof.node for dof in node_dofs(sensors)}
     marks = dict.fromkeys(place, MARKS["node"]) | {
         node: MARKS["support"] for node in geometry.supports if node in place
     }
-    marks |= {dof.node: MARKS["point"] for dof in points}
+    marks |= {dof.node: MARKS["point"] for dof in node_dofs(points)}
     marks |= {node: MARKS["both" if node in sensed else "input"] for node in excited}
     marks |= dict.fromkeys(sensed - excited, MARKS["sensor"])
     for node in sorted(marks, key=lambda node: marks[node] != MARKS["node"]):

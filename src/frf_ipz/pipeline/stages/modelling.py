@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from frf_ipz.diagnosis.result import Diagnosis
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.pipeline.stage_runner import StageRunner
@@ -203,5 +203,5 @@ def update(
     )
 
 
-def _once(dofs: Iterable[Dof]) -> tuple[Dof, ...]:
+def _once(dofs: Iterable[AnyDof]) -> tuple[AnyDof, ...]:
     return tuple(dict.fromkeys(dofs))

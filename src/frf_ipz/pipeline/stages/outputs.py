@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.assessment.assessment import Assessment
     from frf_ipz.diagnosis.result import Diagnosis
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.export.options import ExportOptions
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.identification.modal_fit import ModalFit
@@ -203,7 +203,11 @@ def report(runner: StageRunner) -> None:
 
 
 def _design_files(
-    updated: UpdatedModel, modal_fit: ModalFit, points: Sequence[Dof], options: ExportOptions, delays: dict[str, float]
+    updated: UpdatedModel,
+    modal_fit: ModalFit,
+    points: Sequence[AnyDof],
+    options: ExportOptions,
+    delays: dict[str, float],
 ) -> Writers:
     """Members of the posterior, and the bound of what they do to each output."""
     members = make_state_space_ensemble(modal_fit, updated, points=points, options=options, delays_s=delays)

@@ -37,10 +37,9 @@ DIFFERENCE = 0.03  # relative: that damping follows frequency is left out of the
 
 def context_of(model, names):
     layout = make_layout(names)
-    locations = [model.full_index(dof) for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)]
     options = DiagnoseOptions()
     return ModelContext(
-        basis=make_basis(model, 2 * np.pi * BAND_HZ[1], locations),
+        basis=make_basis(model, 2 * np.pi * BAND_HZ[1], layout.dofs),
         layout=layout,
         band_hz=BAND_HZ,
         contour=S,

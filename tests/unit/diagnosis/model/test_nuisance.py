@@ -41,8 +41,7 @@ def model_of(folder, *, thickness_m=0.01, formulation="euler-bernoulli"):
 
 def nuisance_prior_of(model, top_hz):
     label = FrfLabel(output_dof=Dof(1, "z"), input_dof=Dof(12, "z"), quantity=FrfQuantity.ACCELERANCE)
-    locations = [model.full_index(label.output_dof), model.full_index(label.input_dof)]
-    basis = make_basis(model, 2 * np.pi * top_hz, locations)
+    basis = make_basis(model, 2 * np.pi * top_hz, [label.output_dof, label.input_dof])
     return make_nuisance_prior(basis, make_layout([label]), DiagnoseOptions())
 
 

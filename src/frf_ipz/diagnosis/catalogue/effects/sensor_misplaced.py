@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -20,12 +21,12 @@ class SensorMisplaced(Effect):
     imitators = ("sensor_gain",)
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
-        """Every other node for every channel that stays at one node."""
+        """Every other node for every channel that stays at one node; a port has none."""
         channels = [channel for channel, _ in context.layout.outputs]
         return [
             _make_location(channel, candidate.node)
             for channel, dof in context.layout.outputs
-            if channels.count(channel) == 1
+            if channels.count(channel) == 1 and isinstance(dof, Dof)
             for candidate in context.moving_dofs
             if candidate.direction == dof.direction and candidate.node != dof.node
         ]
@@ -48,7 +49,7 @@ class SensorMisplaced(Effect):
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside."""
         channel, node = str(location.key[0]), int(str(location.key[1]))
-        dof = next(dof for name, dof in context.layout.outputs if name == channel)
+        dof = _nominal_dof(context, channel)
         return [
             _make_location(channel, neighbour)
             for neighbour in context.neighbouring_nodes(node, dof.direction)
@@ -59,8 +60,12 @@ class SensorMisplaced(Effect):
         """Say which sensor, and where it is."""
         del values
         channel, node = str(location.key[0]), int(str(location.key[1]))
-        dof = next(dof for name, dof in context.layout.outputs if name == channel)
+        dof = _nominal_dof(context, channel)
         return f"The sensor of '{channel}' sits at {context.describe_node(node)}, not at node {dof.node}."
+
+
+def _nominal_dof(context: ModelContext, channel: str) -> Dof:
+    return next(dof for name, dof in context.layout.outputs if name == channel and isinstance(dof, Dof))
 
 
 def _make_location(channel: str, node: int) -> Location:

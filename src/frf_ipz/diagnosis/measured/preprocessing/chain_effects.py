@@ -64,4 +64,5 @@ def _filter_inversely(record: ObservedRecord, values: FloatArray, channel: str, 
 
 def _sensor_at_true_node(sensor: Sensor, change: Change) -> Sensor:
     node = change.moved.get(sensor.channel)
-    return sensor if node is None else replace(sensor, dof=Dof(node, sensor.dof.direction, sensor.dof.sign))
+    dof = sensor.dof
+    return sensor if node is None or not isinstance(dof, Dof) else replace(sensor, dof=replace(dof, node=node))

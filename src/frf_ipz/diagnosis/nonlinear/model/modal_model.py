@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.dofs import TRANSLATIONS, Dof
+from frf_ipz.dofs import TRANSLATIONS, AnyDof, Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import ModalBasis, damping_ratios, solve_basis
@@ -102,7 +102,7 @@ class ModalModel:
     damping_ratio: FloatArray
     n_rigid: int
     sensors: tuple[Sensor, ...]
-    inputs: tuple[Dof, ...]
+    inputs: tuple[AnyDof, ...]
     locations: tuple[Location, ...]
     at_sensors: Points
     at_inputs: Points
@@ -190,14 +190,15 @@ def make_modal_model(model: StructuralModel, observations: Observations) -> Moda
     """
     sensors = tuple({(s.channel, s.dof): s for record in observations.records for s in record.sensors}.values())
     inputs = observations.input_dofs
-    locations = find_locations(model, {dof.direction for dof in (*inputs, *(s.dof for s in sensors))})
+    measured = (*(sensor.dof for sensor in sensors), *inputs)
+    locations = find_locations(model, {dof.direction for dof in model.dofs_in(measured)})
     top_hz = MODES_TO * observations.band_hz[1]
     basis = solve_basis(model) if np.count_nonzero(~model.fixed) < DENSE_ORDER else solve_basis(model, up_to_hz=top_hz)
     n_modes = int(np.count_nonzero(basis.natural_frequency_hz <= top_hz))
     n_modes = min(max(n_modes, MIN_MODES), len(basis.eigenvalues))
     low = basis.first(n_modes)
     omega, damping = _suspended_poles(model, low)
-    rows = [_dof_weights(model, ((1, dof),)) for dof in (*(s.dof for s in sensors), *inputs)]
+    rows = list(model.rows(measured).toarray())
     rows += [
         _dof_weights(model, tuple(zip((1,) if len(p.ends) == 1 else (-1, 1), p.ends, strict=True))) for p in locations
     ]

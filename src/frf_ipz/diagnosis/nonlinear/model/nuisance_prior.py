@@ -22,11 +22,12 @@ from frf_ipz.diagnosis.nonlinear.model.modal_model import (
     remaining_motion,
     respond,
 )
+from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.segments import SegmentSet
     from frf_ipz.diagnosis.options import DiagnoseOptions
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
 
 FREE_TO = 2.0  # times the top of the band: modes whose parameters are free
 
@@ -364,7 +365,7 @@ def _location_shape_stds(modal_model: ModalModel, modes: IntArray, options: Diag
 
 
 def _point_shape_stds(
-    modal_model: ModalModel, dofs: tuple[Dof, ...], modes: IntArray, options: DiagnoseOptions
+    modal_model: ModalModel, dofs: tuple[AnyDof, ...], modes: IntArray, options: DiagnoseOptions
 ) -> FloatArray:
     """Give stds of shapes at points by gains, uneven stiffness and, by their slope, the exact position."""
     largest = np.abs(modal_model.at_locations.shapes[:, modes]).max(0)
@@ -386,9 +387,9 @@ def _point_shape_stds(
     return np.array(spread)
 
 
-def _largest_slope(modal_model: ModalModel, dof: Dof, shape: FloatArray, modes: IntArray) -> FloatArray:
+def _largest_slope(modal_model: ModalModel, dof: AnyDof, shape: FloatArray, modes: IntArray) -> FloatArray:
     """Largest change of shapes towards neighbours, per length of the structure."""
-    if modal_model.model.kind == "lumped":
+    if modal_model.model.kind == "lumped" or not isinstance(dof, Dof):
         return np.zeros(len(modes))
     geometry = modal_model.model.geometry
     position = dict(zip(geometry.nodes.tolist(), geometry.coordinates_m, strict=True))
