@@ -140,7 +140,7 @@ def test_faults_of_a_universal_file_are_named(tmp_path, changed, message):
         (TEST.replace("modes.csv", "none.csv"), "none.csv: there is no such file"),
         (TEST + TEST.partition("[[")[1] + 'modes]]\nfile = "modes.csv"\n', "has 2 \\[\\[modes\\]\\]"),
         ('[test]\nkind = "modes"\n', "needs at least one \\[\\[modes\\]\\]"),
-        (TEST + 'input_dofs = ["tip"]\n', "\\[\\[modes\\]\\] 'modes.csv': 'tip' is no DOF label"),
+        (TEST + 'input_dofs = ["tip:z"]\n', "\\[\\[modes\\]\\] 'modes.csv': 'tip:z' is no DOF label"),
         (TEST.replace("modes.csv", "test.toml"), "is of no known format for modes"),
         (TEST.replace('"modes"', '"frf"'), "'frf' has \\[\\[frf\\]\\] entries"),
     ],
