@@ -47,6 +47,8 @@ from .errors import PairingError as PairingError
 from .errors import QuantityError as QuantityError
 from .errors import ShapeError as ShapeError
 from .export.frequency_response_data import to_frd as to_frd
+from .export.modal_files import write_frfs as write_frfs
+from .export.modal_files import write_modes as write_modes
 from .export.options import ExportOptions as ExportOptions
 from .export.state_space import StateSpaceModel as StateSpaceModel
 from .export.state_space import to_state_space as to_state_space

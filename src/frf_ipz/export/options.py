@@ -25,12 +25,15 @@ class ExportOptions:
         0 for a continuous model, else the sample time of a discrete one (zero-order hold).
     ensemble : int
         Number of members of the posterior to write besides.
+    files : tuple of str
+        Files for other modal software, written with the fit: ``modes.csv``, ``modes.xlsx``, ``modes.unv`` (data sets
+        55), ``frf.unv`` (data sets 58).
 
     Examples
     --------
     >>> import frf_ipz
     >>> frf_ipz.ExportOptions(outputs="displacement", sample_time_s=1e-4)
-    ExportOptions(outputs='displacement', residual='dynamics', pade_order=0, sample_time_s=0.0001, ensemble=0)
+    ExportOptions(outputs='displacement', residual='dynamics', pade_order=0, sample_time_s=0.0001, ensemble=0, files=())
     """
 
     __pydantic_config__ = STRICT
@@ -40,6 +43,7 @@ class ExportOptions:
     pade_order: CountOrNone = 0
     sample_time_s: NotNegative = 0.0
     ensemble: CountOrNone = 0
+    files: tuple[Literal["modes.csv", "modes.xlsx", "modes.unv", "frf.unv"], ...] = ()
 
     def __post_init__(self) -> None:
         check_values(self)

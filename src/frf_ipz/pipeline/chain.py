@@ -67,6 +67,7 @@ def chain(
     fit = measurement.fit(runner, frfs, modes=recordings.modes, corrected_by=diagnosis)
     if inputs.test.has_frf_levels:
         mismatch.levels(runner, fit, recordings.frfs)
+    outputs.files(runner, fit, frfs)
     yield "fit"
     if model is not None:
         modelling.outline(runner, model, corrected_by=diagnosis)

@@ -34,6 +34,7 @@ NEEDS = {
     "causes": ("predict", "diagnose", "reference"),
     "assess": ("predict", "diagnose", "reference", "causes"),
     "export": ("update",),
+    "files": ("fit",),
 }
 
 

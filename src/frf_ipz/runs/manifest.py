@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 MANIFEST = "run.json"
-STAGE_NAMES = frozenset({*RESULTS, "report"})
+STAGE_NAMES = frozenset({*RESULTS, "files", "report"})
 FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*\.[a-z0-9]+")  # what a stage writes: in the run's own folder
 TEXTS = ("frf_ipz", "python", "when", "pipeline", "name")
 TABLES = ("packages", "test", "configuration", "inputs", "stages")

@@ -1,4 +1,4 @@
-"""Modes as universal files (UFF): data sets 55 of normal modes (analysis type 2) and complex modes (3), in text.
+"""Modes as universal files (UFF): data sets 55 of normal modes (analysis type 2) and complex modes (3 and 7), in text.
 
 What the records hold: Universal File Datasets Summary, number 55, Structural Dynamics Research Laboratory, University
 of Cincinnati. DOFs that are 0 in every mode were not measured: nodes without a sensor in a direction hold a 0 there.
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.modes import ModalParameters
 
 END = "-1"
-NORMAL_MODE, COMPLEX_MODE = 2, 3
+NORMAL_MODE, COMPLEX_MODES = 2, (3, 7)  # the latter of displacements, or of velocities
 REAL, COMPLEX = (2, 4), (5, 6)  # types of data, of single and of double precision
 PER_LINE = 6  # numbers
 LARGEST = 999_999_999  # integer of a field of ten columns
@@ -56,18 +56,11 @@ class _ModesUff:
         if not shapes:
             raise FileFormatError(source.path, f"holds no mode shape (data set 55); {ADVICE}")
         nodes = list(dict.fromkeys(node for shape in shapes for node in shape.values))
-        for place, shape in enumerate(shapes):
-            lacking = [node for node in nodes if node not in shape.values]
-            if lacking:
-                problem = (
-                    f"its mode {place + 1} ({shape.frequency_hz:g} Hz) has no node {lacking[0]}, which others have"
-                )
-                raise FileFormatError(source.path, f"{problem}; {ADVICE}")
         width = max(len(value) for shape in shapes for value in shape.values.values())
         table = np.zeros((len(nodes), width, len(shapes)), complex)
         for place, shape in enumerate(shapes):
-            for row, node in enumerate(nodes):
-                table[row, : len(shape.values[node]), place] = shape.values[node]
+            for node, values in shape.values.items():  # a node that a mode leaves out is 0 in it
+                table[nodes.index(node), : len(values), place] = values
         measured = np.argwhere(table.any(axis=2))
         return make_modes(
             source,
@@ -145,7 +138,7 @@ def _read_shape(path: Path, lines: list[str], first: int, end: int) -> _Shape:
     at = first + N_NAMES
     _, analysis, _, _, data_type, n_values = data.integers(at, 10, 6, "the types of a data set 55")
     is_complex = data_type in COMPLEX
-    if analysis not in (NORMAL_MODE, COMPLEX_MODE) or not (is_complex or data_type in REAL):
+    if analysis not in (NORMAL_MODE, *COMPLEX_MODES) or not (is_complex or data_type in REAL):
         raise data.fault(f"the analysis of type {analysis} with data of type {data_type} is no mode that is read", at)
     if not 1 <= n_values <= len(DIRECTIONS):
         raise data.fault(f"{n_values} values a node; a node has 1 to 6", at)
@@ -160,7 +153,7 @@ def _read_shape(path: Path, lines: list[str], first: int, end: int) -> _Shape:
 def _read_pole(data: _DataSet, line: int, analysis: int, n_real: int) -> tuple[float, float]:
     """Read frequency and damping ratio; a loss factor is twice the viscous ratio that dissipates as much."""
     values = data.numbers(line, 13, min(max(n_real, 2), 4), "the frequency of a mode")
-    if analysis == COMPLEX_MODE:
+    if analysis in COMPLEX_MODES:
         pole = np.array(complex(values[0], abs(values[1])))
         frequency_hz, ratio = float(natural_frequency_hz(pole)), float(damping_ratio(pole))
     else:

@@ -10,7 +10,9 @@ import numpy as np
 
 from frf_ipz.assessment.assess import assess as judge_run
 from frf_ipz.assessment.evidence import Evidence
+from frf_ipz.errors import InputError
 from frf_ipz.export import run_tables as tables
+from frf_ipz.export.modal_files import write_frfs, write_modes
 from frf_ipz.export.parquet import write_table
 from frf_ipz.export.state_space import make_state_space, make_state_space_ensemble
 from frf_ipz.export.state_space_files import write_ensemble, write_state_space, write_uncertainty_weights
@@ -18,6 +20,7 @@ from frf_ipz.export.uncertainty import estimate_uncertainty_weights
 from frf_ipz.frf import FrfSet
 from frf_ipz.pipeline.stages.delays import known_delays
 from frf_ipz.prediction.predict import predict_frfs
+from frf_ipz.rational import without_window
 from frf_ipz.report.page import write_report
 from frf_ipz.runs.results import Results
 from frf_ipz.updating.updated_model import UpdateStatus
@@ -183,6 +186,32 @@ def export(
             **(_design_files(updated, modal_fit, inputs.points, options, delays) if has_members else {}),
         },
     )
+
+
+def files(runner: StageRunner, modal_fit: ModalFit, frfs: FrfSet) -> None:
+    """Write what the user has asked for in the files of other modal software.
+
+    Parameters
+    ----------
+    runner : StageRunner
+        Inputs, folder and keys of the earlier stages.
+    modal_fit : ModalFit
+        The fitted model.
+    frfs : FrfSet
+        The measured FRFs; without an exponential window in the file.
+    """
+    asked = runner.inputs.options.export.files
+    if "frf.unv" in asked and not frfs.n_frfs:
+        raise InputError(f"{runner.inputs.source}: [export] files has 'frf.unv', and the test has no FRF; take it out")
+    if not asked:
+        runner.store.mark_stale(("files",))
+        return
+    measured = without_window(frfs, modal_fit.model)
+    key = runner.make_key("files", {"after": runner.after("fit"), "asked": sorted(asked)})
+    write_all: Writers = {
+        name: partial(write_frfs, measured) if name == "frf.unv" else partial(write_modes, modal_fit) for name in asked
+    }
+    runner.store.page("files", key, write_all)
 
 
 def report(runner: StageRunner) -> None:
