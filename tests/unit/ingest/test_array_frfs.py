@@ -134,6 +134,6 @@ def test_what_does_not_fit_is_said(tmp_path, keys, message):
 
 
 def test_two_arrays_of_frfs_are_not_mixed(tmp_path):
-    scipy.io.savemat(tmp_path / "a.mat", {"H": FRFS, "G": 2 * FRFS, "f": LINES_HZ})
+    scipy.io.savemat(tmp_path / "a.mat", {"H": FRFS, "H2": 2 * FRFS, "f": LINES_HZ})
     with pytest.raises(InputError, match=r"several arrays that may be FRFs.*variables = \{ frf = \"H\" \}"):
         read(tmp_path / "a.mat")

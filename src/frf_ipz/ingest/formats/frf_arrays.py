@@ -35,6 +35,7 @@ ANGULAR = re.compile(r"(w|omega\w*|om|rad_?s|w_?(vec|axis)\w*)", re.IGNORECASE)
 COHERENCE = re.compile(r"(coh|gamma2?|cxy)\w*", re.IGNORECASE)
 OUTPUTS = re.compile(r"(output|response|out)_?(dofs?|names?|points?|channels?)", re.IGNORECASE)
 INPUTS = re.compile(r"(input|reference|excitation|in|ref)_?(dofs?|names?|points?|channels?)", re.IGNORECASE)
+FRF_NAME = re.compile(r"h(?![a-z])|frf|tf|accelerance|mobility|receptance|responsedata", re.IGNORECASE)
 RESPONSE_DATA = "ResponseData"  # of frd and idfrd
 FEWEST_LINES = 2
 
@@ -102,6 +103,14 @@ class _ArrayFrfs:
 FORMAT = _ArrayFrfs()
 
 
+def _own_frequencies(values: ComplexArray) -> FloatArray | None:
+    """Give the first of two columns where it holds the frequencies of the other, as SignalCalc saves a function."""
+    if values.ndim != 2 or values.shape[1] != 2 or len(values) < FEWEST_LINES or np.any(values[:, 0].imag):
+        return None
+    frequency_hz = np.asarray(values[:, 0].real)
+    return frequency_hz if frequency_hz[0] >= 0.0 and (np.diff(frequency_hz) > 0.0).all() else None
+
+
 def find_frfs(source: FrfSource) -> tuple[FrfBlock, ...]:
     """Find the FRFs among the arrays of a file.
 
@@ -132,6 +141,8 @@ def find_frfs(source: FrfSource) -> tuple[FrfBlock, ...]:
     if set(variables) & set(PARTS):
         return (_named_block(arrays, variables),)
     blocks = [*_testlab_blocks(arrays), *_response_data(arrays)] or _blocks_by_shape(arrays, variables)
+    named = [block for block in blocks if FRF_NAME.match(last_part(block.name))]
+    blocks = named or blocks
     if not blocks:
         problem = "holds no complex array with a vector of as many frequencies"
         way_out = 'name them, as in variables = { frequency_hz = "f", frf = "H" } of its [[frf]]'
@@ -144,8 +155,11 @@ def _named_block(arrays: FileArrays, variables: Mapping[str, str]) -> FrfBlock:
     values = _complex_values(arrays, given)
     name = next(name for key, name in variables.items() if key in PARTS)
     axes = [key for key in given if key in FREQUENCIES]
-    about = ""
-    if axes:
+    own, about = None if axes or GRID[0] in given else _own_frequencies(values), ""
+    if own is not None:
+        frequency_hz, values = own, values[:, 1:]
+        about = f"the frequencies of '{name}' are in its first column"
+    elif axes:
         frequency_hz = _vector(arrays, variables[axes[0]], given[axes[0]]) * FREQUENCIES[axes[0]]
     elif GRID[0] in given:
         step_hz, start_hz = (_number(arrays, variables.get(key, key), given.get(key, np.zeros(1))) for key in GRID)
@@ -266,7 +280,12 @@ def _response_data(arrays: FileArrays) -> list[FrfBlock]:
 
 def _blocks_by_shape(arrays: FileArrays, variables: Mapping[str, str]) -> list[FrfBlock]:
     blocks = []
-    for name, values in _complex_arrays(arrays):
+    for name, whole in _complex_arrays(arrays):
+        values, own = whole, None if set(variables) & set(FREQUENCIES) else _own_frequencies(whole)
+        if own is not None:
+            about = f"FRF in '{name}' ({describe(values)}), its frequencies in the first column"
+            blocks.append(FrfBlock(name=name, frequency_hz=own, values=values[:, 1:, None], about=about))
+            continue
         found = _find_frequencies(arrays, values.shape, variables)
         if found is None or values.ndim > 3:
             continue

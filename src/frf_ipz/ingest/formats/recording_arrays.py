@@ -124,7 +124,12 @@ def find_signals(arrays: FileArrays, keys: TableKeys, columns: Sequence[str]) ->
     ]
     signals = [signal for candidate in candidates for signal in _columns(arrays, candidate)]
     time, note = (None, "") if keys.time_column else _find_time(arrays, signals, keys, columns)
-    others = [signal for signal in signals if time is None or signal is not time]
+    has_own = {signal.name for signal in signals if signal.time is not None}
+    others = [
+        signal
+        for signal in signals
+        if signal is not time and not (time is None and has_own and signal.time is None and _grows(signal.values))
+    ]
     times = None
     if time is not None:
         times = time.values * (unit_factor(time.unit, "time") if time.unit else 1.0)
@@ -132,9 +137,8 @@ def find_signals(arrays: FileArrays, keys: TableKeys, columns: Sequence[str]) ->
     names = ", ".join(f"'{signal.name}'" for signal in others)
     chosen = f"taken by their shape: {names}, {n_samples} samples each; {note}"
     chosen += f"; left out: {', '.join(left_out)}" if left_out else ""
-    return SignalTable(
-        path=arrays.path, signals=tuple(replace(signal, time=times) for signal in others), notes=(chosen,)
-    )
+    timed = tuple(signal if times is None else replace(signal, time=times) for signal in others)
+    return SignalTable(path=arrays.path, signals=timed, notes=(chosen,))
 
 
 def _may_be_signals(array: NumericArray) -> bool:
@@ -159,6 +163,8 @@ def _columns(arrays: FileArrays, candidate: _Candidate) -> Iterator[Signal]:
     rows = np.moveaxis(candidate.values, candidate.axis, 0)
     columns = rows.reshape(candidate.n_samples, -1)
     n_columns = columns.shape[1]
+    first = columns[:, 0].astype(np.float64) if n_columns > 1 else np.empty(0)
+    own_time = first if n_columns > 1 and _grows(first) and not _counts(first) else None
     units = _texts_beside(arrays, candidate.name, UNIT, n_columns)
     labels = _texts_beside(arrays, candidate.name, NAMES, n_columns) if n_columns > 1 else ()
     for number in range(n_columns):
@@ -173,6 +179,7 @@ def _columns(arrays: FileArrays, candidate: _Candidate) -> Iterator[Signal]:
             name=label if label and list(labels).count(labels[number]) == 1 else name,
             values=columns[:, number].astype(np.float64),
             unit=units[number].strip() if units else _unit_of_time(name),
+            time=own_time if number else None,
             dof=dofs[0] if len(dofs) == 1 else None,
         )
 
@@ -213,6 +220,8 @@ def _find_time(
         bare = last_part(signal.name)
         if (TIME.match(bare) or TIME_SHORT.fullmatch(bare)) and _grows(signal.values):
             return signal, f"the time is '{signal.name}'"
+    if any(signal.time is not None for signal in signals):  # the first column of each matrix is the time of the others
+        return None, "the time is the first column of each"
     rate_hz, source = (None, "") if keys.sample_rate_hz is not None else _find_rate(arrays, keys.rate_variable)
     if rate_hz is None and len(free) > 1:
         even = [signal for signal in free if _grows(signal.values) and not _counts(signal.values)]

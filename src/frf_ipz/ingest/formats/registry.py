@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf
+    from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf
     from frf_ipz.ingest.formats.modes_file import ModesSource
     from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents
     from frf_ipz.modes import ModalParameters
@@ -115,6 +115,32 @@ def look_at_recording(path: Path, keys: TableKeys | None = None) -> RecordingCon
         candidate for candidate in _formats(RecordingFormat) if candidate.fits(path, head)
     ).look(path, keys or TableKeys())
     return found
+
+
+def look_at_frfs(source: FrfSource) -> FrfContents | None:
+    """Say what a file of FRFs of any format holds.
+
+    Parameters
+    ----------
+    source : FrfSource
+        The file; nothing needs to be known of it.
+
+    Returns
+    -------
+    FrfContents or None
+        None where no format of FRFs takes the file for its own.
+
+    Raises
+    ------
+    FileFormatError
+        If it is a file that may hold FRFs, and holds none.
+    """
+    head = read_head(source.path)
+    for candidate in _formats(FrfFormat):
+        if candidate.holds(source, head):
+            contents: FrfContents = candidate.look(source)
+            return contents
+    return None
 
 
 def find_array_format(head: bytes) -> ArrayFormat | None:

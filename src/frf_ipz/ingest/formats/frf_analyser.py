@@ -1,0 +1,138 @@
+"""One FRF as text of an analyser (SignalCalc, OROS, CutPro, LMS and others) whose header says what the columns are."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from frf_ipz.errors import FileFormatError, QuantityError
+from frf_ipz.ingest.formats import frf_text
+from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf
+from frf_ipz.ingest.formats.text_layout import is_number, name_and_unit, sniff
+from frf_ipz.ingest.units import frf_factor
+from frf_ipz.quantities import FrfQuantity
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.ingest.formats.text_layout import TextLayout
+
+ROLES = (  # of a column, by its name; the first that fits
+    ("frequency_hz", re.compile(r"freq|^f$|^f ?\[|\bhz\b", re.IGNORECASE)),
+    ("coherence", re.compile(r"coh|gamma", re.IGNORECASE)),
+    ("imag", re.compile(r"imag|^im\b", re.IGNORECASE)),
+    ("real", re.compile(r"real|^re\b", re.IGNORECASE)),
+    ("phase_rad", re.compile(r"pha.*rad", re.IGNORECASE)),
+    ("phase_deg", re.compile(r"pha|angle", re.IGNORECASE)),
+    ("magnitude_db", re.compile(r"(mag|amp|abs|mod).*db|^db", re.IGNORECASE)),
+    ("magnitude", re.compile(r"mag|amp|abs|modul", re.IGNORECASE)),
+)
+RATIO = re.compile(r"\(([^()]+)\)\s*\(([^()]+)\)")  # SignalCalc writes (m/s²)(N) for a ratio
+MOST_HEAD = 1 << 12  # bytes in which a binary file shows itself
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnalyserColumns:
+    """What the columns of an analyser's text are.
+
+    Parameters
+    ----------
+    columns : tuple of str
+        As `columns` of ``[[frf]]`` says it.
+    unit : str
+        Of the values; may be empty.
+    quantity : FrfQuantity, optional
+        What has that unit.
+    """
+
+    columns: tuple[str, ...]
+    unit: str = ""
+    quantity: FrfQuantity | None = None
+
+
+class _AnalyserText:
+    rank = 50
+
+    def holds(self, source: FrfSource, head: bytes) -> bool:
+        if source.columns or b"\0" in head[:MOST_HEAD] or source.skip_rows:
+            return False
+        return find_frf_columns(source) is not None
+
+    def read(self, source: FrfSource) -> tuple[MeasuredFrf, ...]:
+        found = find_frf_columns(source)
+        if found is None:
+            raise FileFormatError(
+                source.path, "does not say what its columns are; write columns = [...] in its [[frf]]"
+            )
+        unit = found.unit if found.quantity is source.quantity else ""
+        frfs = frf_text.FORMAT.read(replace(source, columns=found.columns))
+        about = f"{source.path.name}: its columns are {', '.join(found.columns)}"
+        return tuple(replace(frf, source=source, unit=unit, notes=(*frf.notes, about)) for frf in frfs)
+
+    def look(self, source: FrfSource) -> FrfContents:
+        found = find_frf_columns(source)
+        if found is None:
+            raise FileFormatError(source.path, "does not say what its columns are")
+        about = f"columns {', '.join(found.columns)}"
+        return FrfContents(n_outputs=1, n_inputs=1, quantity=found.quantity, unit=found.unit, about=about)
+
+
+FORMAT = _AnalyserText()
+
+
+def find_frf_columns(source: FrfSource) -> AnalyserColumns | None:
+    """Find out from its header what the columns of a text file are.
+
+    Parameters
+    ----------
+    source : FrfSource
+        The file.
+
+    Returns
+    -------
+    AnalyserColumns or None
+        None where the header does not speak of an FRF.
+    """
+    try:
+        layout = sniff(source.path)
+    except FileFormatError:
+        return None
+    for fields in layout.header:
+        words = [field for field in fields if field and not is_number(field)]
+        roles = [_role(word) or frf_text.SKIP for word in words]
+        if len(words) != layout.n_columns:  # units stand between the names
+            roles = list(dict.fromkeys(role for role in roles if role != frf_text.SKIP))
+        known = set(roles)
+        is_complete = {"real", "imag"} <= known or (
+            bool(known & {"magnitude", "magnitude_db"}) and bool(known & {"phase_deg", "phase_rad"})
+        )
+        named = [role for role in roles if role != frf_text.SKIP]
+        if (
+            len(roles) == layout.n_columns
+            and is_complete
+            and roles[0] == "frequency_hz"
+            and len(set(named)) == len(named)
+        ):
+            unit, quantity = _unit_of(layout, words)
+            return AnalyserColumns(columns=tuple(roles), unit=unit, quantity=quantity)
+    return None
+
+
+def _role(word: str) -> str:
+    return next((role for role, pattern in ROLES if pattern.search(word)), "")
+
+
+def _unit_of(layout: TextLayout, words: Sequence[str]) -> tuple[str, FrfQuantity | None]:
+    """Find the text of the header that is a unit of FRFs, and of which."""
+    fields = [field for row in layout.header for field in row]
+    for text in (*(name_and_unit(word)[1] for word in words), *fields):
+        ratio = RATIO.fullmatch(text.strip())
+        for unit in (text, f"({ratio[1]})/({ratio[2]})") if ratio else (text,):
+            for quantity in FrfQuantity if unit.strip() else ():
+                try:
+                    frf_factor(unit, quantity, "z", "z")
+                except QuantityError:
+                    continue
+                return unit, quantity
+    return "", None
