@@ -117,6 +117,28 @@ def look_at_recording(path: Path, keys: TableKeys | None = None) -> RecordingCon
     return found
 
 
+def is_known_recording(path: Path) -> bool:
+    """Tell whether a format of recordings knows a file by its content; text that is none of these may be a table too.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    bool
+        True if one does.
+
+    Raises
+    ------
+    FileFormatError
+        If it cannot be read, or is empty.
+    """
+    head = read_head(path)
+    return any(candidate.fits(path, head) for candidate in _formats(RecordingFormat)[:-1])
+
+
 def look_at_frfs(source: FrfSource) -> FrfContents | None:
     """Say what a file of FRFs of any format holds.
 

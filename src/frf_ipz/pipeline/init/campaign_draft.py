@@ -5,14 +5,21 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from frf_ipz.errors import InputError
+from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource
+from frf_ipz.ingest.formats.registry import look_at_frfs
+from frf_ipz.ingest.units import frf_factor
 from frf_ipz.pipeline.init.columns import UNITS, read_columns
+from frf_ipz.pipeline.init.excitation import excitation
 from frf_ipz.pipeline.init.text import HEAD, guessed, quoted, with_comment
+from frf_ipz.quantities import FrfQuantity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from frf_ipz.pipeline.init.columns import Column
+    from frf_ipz.dofs import Dof
+    from frf_ipz.pipeline.init.columns import Column, Columns
     from frf_ipz.pipeline.init.folder_contents import FolderContents
     from frf_ipz.pipeline.init.places import Places
 
@@ -20,6 +27,7 @@ TRAILING_NUMBER = re.compile(r"\d*$")
 NODE = re.compile(r"(\d+)")
 QUANTITIES = "force | acceleration | velocity | displacement"
 SENSITIVITY = "10.2 mV/g_0"
+ENTRIES = {"hammer": "hit", "random": "record"}
 
 
 def draft_test(contents: FolderContents, places: Places) -> str:
@@ -38,8 +46,8 @@ def draft_test(contents: FolderContents, places: Places) -> str:
         Text of ``test.toml``.
     """
     if contents.recordings:
-        return _hammer_test(contents, places)
-    return _frf_test(contents) if contents.frfs else _modes_test(contents)
+        return _test_of_recordings(contents, places)
+    return _frf_test(contents, places) if contents.frfs else _modes_test(contents)
 
 
 def _head(contents: FolderContents) -> list[str]:
@@ -52,23 +60,59 @@ def _head(contents: FolderContents) -> list[str]:
     ]
 
 
-def _hammer_test(contents: FolderContents, places: Places) -> str:
+def _test_of_recordings(contents: FolderContents, places: Places) -> str:
     columns = read_columns(contents.recordings)
-    lines = [*_head(contents), guessed('kind = "hammer"', "hammer | random (shaker, long records)")]
+    kind = excitation(contents.recordings, columns)
+    lines = [*_head(contents), guessed(f'kind = "{kind}"', "hammer | random (shaker, long records)")]
     if not columns.has_time:
         lines.append(guessed("# sample_rate_hz = 2048.0", "needed: the files have no column of time"))
     lines += _channel(columns.force, "input")
+    known = {name: dofs for name in columns.names if len(dofs := _dofs_of(columns, name)) == 1}
     for number, column in enumerate(columns.responses, start=1):
         lines += _channel(column, "output")
-        lines.append(guessed(f"dof = {quoted(places.of_sensor(number))}", "NODE:SIGN DIRECTION of the sensor"))
+        if column.name in known:
+            lines.append(with_comment(f"dof = {quoted(str(*known[column.name]))}", "as the files say"))
+        elif not _dofs_of(columns, column.name):
+            lines.append(guessed(f"dof = {quoted(places.of_sensor(number))}", "NODE:SIGN DIRECTION of the sensor"))
         lines.append(with_comment("# mass_kg = 0.004", "the sensor's own mass, where it is known"))
     lines += [f"\n# the column {quoted(column.name)} is a force too; a test has one" for column in columns.other_forces]
-    for name, pattern in _groups(contents.folder, contents.recordings).items():
-        numbers = NODE.findall(name)
-        struck = int(numbers[-1]) if numbers else 1
-        lines += ["", "[[hit]]", guessed(f"dof = {quoted(places.of_impact(struck))}", "where these impacts hit")]
-        lines.append(f"files = [{quoted(pattern)}]")
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_setups(contents, places, columns, ENTRIES[kind])]) + "\n"
+
+
+def _dofs_of(columns: Columns, name: str) -> set[Dof]:
+    return {dofs[name] for dofs in columns.dofs.values() if name in dofs}
+
+
+def _setups(contents: FolderContents, places: Places, columns: Columns, entry: str) -> list[str]:
+    """Write an entry for each excited DOF and layout of sensors, as far as files say them, else as their names do."""
+    by_dofs: dict[tuple[Dof, ...], list[Path]] = {}
+    for path, dofs in columns.dofs.items():
+        if columns.force.name in dofs:
+            by_dofs.setdefault(tuple(dofs[name] for name in columns.names if name in dofs), []).append(path)
+    if sum(map(len, by_dofs.values())) < len(contents.recordings):
+        lines = []
+        for name, pattern in _groups(contents.folder, contents.recordings).items():
+            numbers = NODE.findall(name)
+            struck = int(numbers[-1]) if numbers else 1
+            lines += ["", f"[[{entry}]]", guessed(f"dof = {quoted(places.of_impact(struck))}", "where the force acts")]
+            lines.append(f"files = [{quoted(pattern)}]")
+        return lines
+    lines = []
+    for paths in by_dofs.values():
+        dofs = columns.dofs[paths[0]]
+        roving = [name for name in columns.names[1:] if name in dofs and len(_dofs_of(columns, name)) > 1]
+        force = quoted(str(dofs[columns.force.name]))
+        lines += ["", f"[[{entry}]]", with_comment(f"dof = {force}", "as the files say")]
+        lines.append(f"files = [{', '.join(quoted(_escaped(contents.name(path))) for path in paths)}]")
+        if roving:
+            pairs = ", ".join(f"{quoted(name)} = {quoted(str(dofs[name]))}" for name in roving)
+            lines.append(f"output_dofs = {{ {pairs} }}")
+    return lines
+
+
+def _escaped(name: str) -> str:
+    """Write the name of a file as a pattern that fits it alone."""
+    return re.sub(r"([*?\[])", r"[\1]", name)
 
 
 def _channel(column: Column, role: str) -> list[str]:
@@ -96,11 +140,10 @@ def _groups(folder: Path, files: Iterable[Path]) -> dict[str, str]:
     return groups
 
 
-def _frf_test(contents: FolderContents) -> str:
+def _frf_test(contents: FolderContents, places: Places) -> str:
     lines = [*_head(contents), 'kind = "frf"']
     for path in contents.frfs:
-        lines += ["", "[[frf]]", f"file = {quoted(contents.name(path))}"]
-        lines.append(guessed('quantity = "accelerance"', "accelerance | mobility | receptance"))
+        lines += ["", "[[frf]]", f"file = {quoted(contents.name(path))}", *_frf_keys(path, places)]
     return "\n".join(lines) + "\n"
 
 
@@ -109,3 +152,41 @@ def _modes_test(contents: FolderContents) -> str:
     lines = [*_head(contents), 'kind = "modes"', "", "[[modes]]", f"file = {quoted(modes)}"]
     lines.append(with_comment('# input_dofs = ["1:+z"]', "where forces act in what is predicted"))
     return "\n".join(lines) + "\n"
+
+
+def _frf_keys(path: Path, places: Places) -> list[str]:
+    """Say what the FRFs of a file are and connect; what the file does not say is guessed."""
+    found = look_at_frfs(FrfSource(path=path, quantity=FrfQuantity.ACCELERANCE)) or FrfContents(n_outputs=1, n_inputs=1)
+    quantity = found.quantity or _quantity_of(found.unit)
+    name = quantity.value if quantity is not None else FrfQuantity.ACCELERANCE.value
+    key = f'quantity = "{name}"'
+    lines = [key if quantity is not None else guessed(key, "accelerance | mobility | receptance")]
+    if found.about:
+        lines.append(f"# {found.about}")
+    if found.lacks_directions:
+        lines.append(guessed('direction = "z"', "of the nodes, which have none in the file"))
+    elif not found.ends:
+        nodes = [int(number) for number in NODE.findall(path.stem)]
+        struck = nodes[-1] if nodes else 1
+        first = nodes[0] if len(nodes) > 1 else struck
+        outputs = [places.of_sensor(number) for number in range(1, found.n_outputs + 1)]
+        inputs = [places.of_impact(number) for number in range(1, found.n_inputs + 1)]
+        if found.n_outputs == found.n_inputs == 1:
+            outputs, inputs = [places.of_impact(first)], [places.of_impact(struck)]
+        lines.append(guessed(f"output_dof = {_listed(outputs)}", "of the sensors"))
+        lines.append(guessed(f"input_dof = {_listed(inputs)}", "of the forces"))
+    return lines
+
+
+def _quantity_of(unit: str) -> FrfQuantity | None:
+    for quantity in FrfQuantity if unit else ():
+        try:
+            frf_factor(unit, quantity, "z", "z")
+        except InputError:
+            continue
+        return quantity
+    return None
+
+
+def _listed(dofs: list[str]) -> str:
+    return quoted(dofs[0]) if len(dofs) == 1 else f"[{', '.join(map(quoted, dofs))}]"

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
-from frf_ipz.ingest.formats.recording import TableKeys
-from frf_ipz.ingest.formats.text_columns import TIME, find_columns
-from frf_ipz.ingest.formats.text_layout import is_number, name_and_unit, sniff
+from frf_ipz.ingest.formats.registry import look_at_recording
+from frf_ipz.ingest.formats.text_layout import name_and_unit
 from frf_ipz.ingest.units import is_stated, unit_factor
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
+    from collections.abc import Mapping, Sequence
 
-    from frf_ipz.ingest.formats.text_columns import TextColumns
+    from frf_ipz.ingest.formats.recording import RecordingContents
 
 UNITS = {"force": "N", "velocity": "m/s", "displacement": "m", "acceleration": "m/s^2"}  # where the files state none
 # What columns are called, in English and German: words first, then the letters that stand at the beginning.
@@ -73,13 +73,21 @@ class Columns:
     other_forces : tuple of Column
         Further forces; a test has one.
     has_time : bool
-        There is a column of time.
+        The files say when their samples were taken.
+    dofs : dict of Path to dict of str to Dof
+        Where each column of a file was measured, by the column's name; empty where the file does not say.
     """
 
     force: Column
     responses: tuple[Column, ...]
     other_forces: tuple[Column, ...]
     has_time: bool
+    dofs: dict[Path, dict[str, Dof]]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The columns of a test: the force first."""
+        return (self.force.name, *(column.name for column in self.responses))
 
 
 def read_columns(files: Sequence[Path]) -> Columns:
@@ -100,8 +108,16 @@ def read_columns(files: Sequence[Path]) -> Columns:
     InputError
         If files have different columns, or no force or no response can be among them.
     """
-    found = _common_columns(files)
-    columns = _signals(files[0], found)
+    contents = {path: look_at_recording(path) for path in files}
+    names = _common_names(contents)
+    first = contents[files[0]]
+    columns = [
+        _column(name, column.label, column.unit if is_stated(column.unit) else "")
+        for name, column in zip(names, first.columns, strict=True)
+    ]
+    if len(columns) < 2:
+        shown = ", ".join(names)
+        raise InputError(f"{files[0]}: a force and a response are needed besides the time; its columns are {shown}")
     forces = [column for column in columns if column.quantity == "force"]
     if not forces:  # the first is it most often, unless its unit says that it is a motion
         guess = next((column for column in columns if not column.unit_tells), None)
@@ -114,42 +130,38 @@ def read_columns(files: Sequence[Path]) -> Columns:
         columns = [column for column in columns if column is not guess]
     responses = tuple(column for column in columns if column.quantity != "force")
     if not responses:
-        names = ", ".join(found.names)
-        raise InputError(f"{files[0]}: a force and a response are needed besides the time; its columns are {names}")
+        shown = ", ".join(names)
+        raise InputError(f"{files[0]}: a force and a response are needed besides the time; its columns are {shown}")
     return Columns(
         force=forces[0],
         responses=responses,
         other_forces=tuple(forces[1:]),
-        has_time=found.time is not None,
+        has_time=all(content.has_time for content in contents.values()),
+        dofs={
+            path: {
+                name: column.dof for name, column in zip(names, content.columns, strict=True) if column.dof is not None
+            }
+            for path, content in contents.items()
+        },
     )
 
 
-def _common_columns(files: Sequence[Path]) -> TextColumns:
-    first = find_columns(sniff(files[0]), TableKeys())
-    for path in files[1:]:
-        other = find_columns(sniff(path), TableKeys())
-        if other.names != first.names:
-            raise InputError(
-                f"{path}: has the columns {', '.join(other.names)}, and {files[0]} has {', '.join(first.names)}; "
-                "put files with different columns into folders of their own and run init on each"
-            )
-    return first
-
-
-def _signals(path: Path, found: TextColumns) -> list[Column]:
-    """Give the columns of signals: those that hold numbers, and are neither a time nor a count."""
-    rows = sniff(path).rows
-    columns = []
-    for index, (name, unit) in enumerate(zip(found.names, found.units, strict=True)):
-        is_time = index == found.time or TIME.match(name) or (index == 0 and found.counts_samples)
-        if is_time or not any(is_number(fields[index]) for fields in rows if index < len(fields)):
+def _common_names(contents: Mapping[Path, RecordingContents]) -> list[str]:
+    """Give names that serve in all files: their own, or numbers where each file calls its columns after its DOFs."""
+    paths = list(contents)
+    names = {path: [column.name for column in contents[path].columns] for path in paths}
+    first = names[paths[0]]
+    for path in paths[1:]:
+        if names[path] == first:
             continue
-        written = name if name and found.names.count(name) == 1 else str(index + 1)
-        columns.append(_column(written, name_and_unit(name)[0], unit if is_stated(unit) else ""))
-    if len(columns) < 2:
-        names = ", ".join(found.names)
-        raise InputError(f"{path}: a force and a response are needed besides the time; its columns are {names}")
-    return columns
+        measured_somewhere = all(column.dof is not None for content in contents.values() for column in content.columns)
+        if measured_somewhere and len({len(found) for found in names.values()}) == 1:
+            return [str(number) for number in range(1, len(first) + 1)]
+        raise InputError(
+            f"{path}: has the columns {', '.join(names[path])}, and {paths[0]} has {', '.join(first)}; "
+            "put files with different columns into folders of their own and run init on each"
+        )
+    return first
 
 
 def _column(written: str, name: str, unit: str) -> Column:

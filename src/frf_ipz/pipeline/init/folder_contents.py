@@ -6,12 +6,18 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from frf_ipz.errors import InputError
+from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.formats.modes_uff import holds_shapes
+from frf_ipz.ingest.formats.registry import is_known_recording, look_at_frfs, look_at_recording
 from frf_ipz.ingest.formats.text_layout import sniff
+from frf_ipz.quantities import FrfQuantity
 
-FRF_COLUMNS = frozenset({"frequency_hz", "output_dof", "input_dof"})
 MODES_COLUMNS = frozenset({"mode", "frequency_hz", "damping_ratio", "dof", "real"})
+CSV = ".csv"
+TEXT = (".txt", ".dat", ".asc", ".tsv", ".prn", ".xlsx")  # may be a table, and may be anything else
+OTHER = (".toml", ".py", ".m", ".md", ".json", ".html", ".mtx")  # settings, programs, results
+FEWEST_ROWS = 16  # of a recording
 DOF_COLUMNS = frozenset({"node", "direction"})
 UNIVERSAL = (".unv", ".uff")
 MATRIX = re.compile(
@@ -29,7 +35,7 @@ class FolderContents:
     folder : Path
         The folder.
     recordings, frfs : tuple of Path
-        Tables of signals over time, and of FRFs.
+        Files of signals over time, and of FRFs, in any format that is read.
     references : tuple of Path
         FRFs that were kept aside: by their names, or because there are recordings too.
     modes : Path, optional
@@ -40,6 +46,8 @@ class FolderContents:
         ``stiffness``, ``mass``, ``damping``, as far as they are there.
     groups : dict of str to dict of str to Path
         The same for additive parts, by their names.
+    unread : dict of Path to str
+        Files that look like measurements, and why they cannot be read as such.
     """
 
     folder: Path
@@ -50,6 +58,7 @@ class FolderContents:
     dof_table: Path | None
     matrices: dict[str, Path]
     groups: dict[str, dict[str, Path]]
+    unread: dict[Path, str]
 
     @property
     def has_matrices(self) -> bool:
@@ -82,20 +91,30 @@ def look_into(folder: Path) -> FolderContents:
     if not folder.is_dir():
         raise InputError(f"{folder}: there is no such folder; give the one that holds the recordings")
     files = sorted(path for path in folder.rglob("*") if path.is_file() and not _is_hidden(path, folder))
-    tables = [path for path in files if path.suffix.lower() == ".csv"]
-    columns = {path: _columns(path) for path in tables}
-    dof_tables = [path for path in tables if columns[path] >= DOF_COLUMNS]
-    all_frfs = [path for path in tables if columns[path] >= FRF_COLUMNS]
-    modes = [path for path in tables if columns[path] >= MODES_COLUMNS]
+    dof_tables = [path for path in files if path.suffix.lower() == CSV and _columns(path) >= DOF_COLUMNS]
+    modes = [path for path in files if path.suffix.lower() == CSV and _columns(path) >= MODES_COLUMNS]
     modes += [path for path in files if path.suffix.lower() in UNIVERSAL and holds_shapes(path)]
-    others = {*dof_tables, *all_frfs, *modes}
-    recordings = tuple(path for path in tables if path not in others)
+    found: dict[str, list[Path]] = {"recording": [], "frf": []}
+    unread: dict[Path, str] = {}
+    for path in files:
+        if path in {*dof_tables, *modes} or path.suffix.lower() in OTHER:
+            continue
+        try:
+            kind = _kind(path)
+        except FileFormatError as error:
+            if path.suffix.lower() == CSV:
+                raise
+            unread[path] = str(error).partition(": ")[2]
+            continue
+        if kind:
+            found[kind].append(path)
+    recordings, all_frfs = tuple(found["recording"]), found["frf"]
     references = tuple(path for path in all_frfs if recordings or modes or KEPT_ASIDE.search(path.stem))
     frfs = tuple(path for path in all_frfs if path not in references)
     if not recordings and not frfs and not modes:
-        raise InputError(
-            f"{folder}: holds no .csv with recordings or FRFs; put them there, one file an impact, then run init again"
-        )
+        hint = "".join(f"; {path.name}: {reason}" for path, reason in list(unread.items())[:1])
+        problem = "holds no recordings and no FRFs in a format that is read (CSV, text, UFF, MATLAB, HDF5, ...)"
+        raise InputError(f"{folder}: {problem}; put them there, one file an impact, then run init again{hint}")
     matrices, groups = _sort_matrices(files)
     return FolderContents(
         folder=folder,
@@ -106,7 +125,37 @@ def look_into(folder: Path) -> FolderContents:
         dof_table=next(iter(dof_tables), None),
         matrices=matrices,
         groups=groups,
+        unread=unread,
     )
+
+
+def _kind(path: Path) -> str:
+    """Tell by its content whether a file is a recording or holds FRFs; empty where it is neither."""
+    is_known = is_known_recording(path)
+    if not is_known and path.suffix.lower() not in {CSV, *TEXT} and not _holds_frfs(path):
+        return ""
+    if _holds_frfs(path):
+        return "frf"
+    if not is_known and path.suffix.lower() != CSV and not _is_table(path):
+        return ""
+    contents = look_at_recording(path)
+    is_recording = path.suffix.lower() == CSV or contents.has_time
+    return "recording" if is_recording and contents.columns else ""
+
+
+def _holds_frfs(path: Path) -> bool:
+    try:
+        return look_at_frfs(FrfSource(path=path, quantity=FrfQuantity.ACCELERANCE)) is not None
+    except FileFormatError:  # a file that might, and does not
+        return False
+
+
+def _is_table(path: Path) -> bool:
+    try:
+        layout = sniff(path)
+    except FileFormatError:
+        return False
+    return layout.n_columns > 1 and len(layout.rows) >= FEWEST_ROWS
 
 
 def _is_hidden(path: Path, folder: Path) -> bool:

@@ -40,7 +40,7 @@ class StartingFiles:
 
 
 def write_starting_files(folder: Path) -> StartingFiles:
-    """Write starting files for a folder of CSVs.
+    """Write starting files for a folder of measurements.
 
     Parameters
     ----------
@@ -105,4 +105,5 @@ def _taken_for(contents: FolderContents) -> list[str]:
         texts.append(f"{contents.name(contents.dof_table)}: rows of the matrices")
     texts += [] if contents.modes is None else [f"{contents.name(contents.modes)}: modes without FRFs"]
     texts += [f"{contents.name(path)}: FRFs kept aside, no recording" for path in contents.references]
+    texts += [f"{contents.name(path)}: left out, {reason}" for path, reason in contents.unread.items()]
     return texts
