@@ -137,3 +137,24 @@ def test_two_arrays_of_frfs_are_not_mixed(tmp_path):
     scipy.io.savemat(tmp_path / "a.mat", {"H": FRFS, "H2": 2 * FRFS, "f": LINES_HZ})
     with pytest.raises(InputError, match=r"several arrays that may be FRFs.*variables = \{ frf = \"H\" \}"):
         read(tmp_path / "a.mat")
+
+
+def test_functions_that_carry_their_axis_in_the_first_column(tmp_path):
+    both = [np.column_stack([LINES_HZ, FRFS[:, 0, input_]]) for input_ in (0, 1)]
+    time = np.arange(400) / 400.0
+    scipy.io.savemat(
+        tmp_path / "a.mat", {"H1_2": both[0], "H1_3": both[1], "S1": both[0], "X1": np.column_stack([time, time**2])}
+    )
+    frfs = read(tmp_path / "a.mat", output="1:+z", input="2:+z", variables={"frf": "H1_3"})
+    np.testing.assert_allclose(frfs.frequency_hz, LINES_HZ)
+    np.testing.assert_allclose(frfs.values[:, 0], FRFS[:, 0, 1])
+    with pytest.raises(InputError, match="several arrays that may be FRFs: 'H1_2'.*'H1_3'"):
+        read(tmp_path / "a.mat", output="1:+z", input="2:+z")
+
+
+def test_lines_of_a_whole_transform(tmp_path):
+    values = np.concatenate([[0.5], FRFS[:, 0, 0]])
+    scipy.io.savemat(tmp_path / "a.mat", {"yspec": values, "freq": 398.0, "npts": 398.0})
+    for variables in ({}, {"frf": "yspec", "sample_rate_hz": "freq"}):
+        frfs = read(tmp_path / "a.mat", output="1:+z", input="1:+z", variables=variables)
+        np.testing.assert_allclose(frfs.frequency_hz[1:], LINES_HZ)

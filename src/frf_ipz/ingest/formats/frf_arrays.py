@@ -17,6 +17,7 @@ from frf_ipz.dofs import AnyDof, Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, did_you_mean
 from frf_ipz.ingest.formats.file_arrays import FileArrays, describe, last_part
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
+from frf_ipz.ingest.formats.recording_arrays import RATE
 from frf_ipz.ingest.formats.registry import find_array_format
 from frf_ipz.ingest.formats.testlab_arrays import points_of, testlab_blocks
 from frf_ipz.ingest.formats.text_layout import read_head
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
 FREQUENCIES = {"frequency_hz": 1.0, "frequency_rad_s": 1.0 / (2.0 * np.pi)}
 PARTS = ("frf", "real", "imag", "magnitude", "magnitude_db", "phase_deg", "phase_rad")
 GRID = ("frequency_step_hz", "frequency_start_hz")
-KNOWN = (*FREQUENCIES, *GRID, *PARTS, "coherence", "variance")
+SAMPLE_RATE = "sample_rate_hz"  # the lines go from 0 Hz to half of it
+KNOWN = (*FREQUENCIES, *GRID, SAMPLE_RATE, *PARTS, "coherence", "variance")
 FREQUENCY = re.compile(r"(f|ff|freq\w*|frf?_?freq\w*|frequenz\w*|hz|f_?(vec|axis|hz)\w*|x)", re.IGNORECASE)
 ANGULAR = re.compile(r"(w|omega\w*|om|rad_?s|w_?(vec|axis)\w*)", re.IGNORECASE)
 COHERENCE = re.compile(r"(coh|gamma2?|cxy)\w*", re.IGNORECASE)
@@ -90,8 +92,10 @@ class _ArrayFrfs:
         return tuple(frf for block in blocks for frf in _measured(source, block))
 
     def look(self, source: FrfSource) -> FrfContents:
-        block = find_frfs(source)[0]
+        blocks = find_frfs(source)
+        block = blocks[0]
         return FrfContents(
+            arrays=tuple(block.name for block in blocks) if len(blocks) > 1 else (),
             n_outputs=block.values.shape[1],
             n_inputs=block.values.shape[2],
             ends=tuple(block.ends or ()),
@@ -155,7 +159,8 @@ def _named_block(arrays: FileArrays, variables: Mapping[str, str]) -> FrfBlock:
     values = _complex_values(arrays, given)
     name = next(name for key, name in variables.items() if key in PARTS)
     axes = [key for key in given if key in FREQUENCIES]
-    own, about = None if axes or GRID[0] in given else _own_frequencies(values), ""
+    is_grid = GRID[0] in given or SAMPLE_RATE in given
+    own, about = None if axes or is_grid else _own_frequencies(values), ""
     if own is not None:
         frequency_hz, values = own, values[:, 1:]
         about = f"the frequencies of '{name}' are in its first column"
@@ -164,6 +169,9 @@ def _named_block(arrays: FileArrays, variables: Mapping[str, str]) -> FrfBlock:
     elif GRID[0] in given:
         step_hz, start_hz = (_number(arrays, variables.get(key, key), given.get(key, np.zeros(1))) for key in GRID)
         frequency_hz = start_hz + step_hz * np.arange(max(values.shape))
+    elif SAMPLE_RATE in given:
+        rate_hz = _number(arrays, variables[SAMPLE_RATE], given[SAMPLE_RATE])
+        frequency_hz = np.linspace(0.0, 0.5 * rate_hz, max(values.shape))
     else:
         found = _find_frequencies(arrays, values.shape, {})
         if found is None:
@@ -342,7 +350,20 @@ def _find_frequencies(
         for name, vector in vectors.items():
             if pattern.fullmatch(last_part(name)):
                 return name, vector * factor
-    return next(iter(vectors.items())) if len(vectors) == 1 else None
+    return next(iter(vectors.items())) if len(vectors) == 1 else _lines_of_transform(arrays, shape)
+
+
+def _lines_of_transform(arrays: FileArrays, shape: tuple[int, ...]) -> tuple[str, FloatArray] | None:
+    """Make the lines of a whole transform, from 0 Hz to half the sampling rate, where numbers beside it say so."""
+    n_lines = max(shape, default=0)
+    singles = {name: float(array.ravel()[0].real) for name, array in arrays.arrays.items() if array.size == 1}
+    if not any(number == 2 * (n_lines - 1) for number in singles.values()):  # of samples
+        return None
+    for name, number in singles.items():
+        is_rate = RATE.fullmatch(last_part(name)) or FREQUENCY.fullmatch(last_part(name))
+        if is_rate and 1.0 < number < np.inf:
+            return f"{name} ({number:g} samples a second)", np.linspace(0.0, 0.5 * number, n_lines)
+    return None
 
 
 def _ends_beside(arrays: FileArrays, name: str, shape: tuple[int, ...]) -> list[tuple[AnyDof, AnyDof]] | None:

@@ -86,6 +86,8 @@ class FrfContents:
         How it was found, where that had to be chosen.
     lacks_directions : bool
         Nodes are named without directions.
+    arrays : tuple of str
+        Arrays of a file that holds several, each with its own FRFs.
     """
 
     n_outputs: int
@@ -95,6 +97,7 @@ class FrfContents:
     unit: str = ""
     about: str = ""
     lacks_directions: bool = False
+    arrays: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

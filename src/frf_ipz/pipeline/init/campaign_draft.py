@@ -142,8 +142,14 @@ def _groups(folder: Path, files: Iterable[Path]) -> dict[str, str]:
 
 def _frf_test(contents: FolderContents, places: Places) -> str:
     lines = [*_head(contents), 'kind = "frf"']
+    taken: set[tuple[str, str]] = set()
     for path in contents.frfs:
-        lines += ["", "[[frf]]", f"file = {quoted(contents.name(path))}", *_frf_keys(path, places)]
+        source = FrfSource(path=path, quantity=FrfQuantity.ACCELERANCE)
+        found = look_at_frfs(source) or FrfContents(n_outputs=1, n_inputs=1)
+        for name in found.arrays or ("",):
+            lines += ["", "[[frf]]", f"file = {quoted(contents.name(path))}"]
+            lines += [f"variables = {{ frf = {quoted(name)} }}"] if name else []
+            lines += _frf_keys(path, found, places, taken)
     return "\n".join(lines) + "\n"
 
 
@@ -154,9 +160,8 @@ def _modes_test(contents: FolderContents) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _frf_keys(path: Path, places: Places) -> list[str]:
-    """Say what the FRFs of a file are and connect; what the file does not say is guessed."""
-    found = look_at_frfs(FrfSource(path=path, quantity=FrfQuantity.ACCELERANCE)) or FrfContents(n_outputs=1, n_inputs=1)
+def _frf_keys(path: Path, found: FrfContents, places: Places, taken: set[tuple[str, str]]) -> list[str]:
+    """Say what FRFs are and connect; what the file does not say is guessed."""
     quantity = found.quantity or _quantity_of(found.unit)
     name = quantity.value if quantity is not None else FrfQuantity.ACCELERANCE.value
     key = f'quantity = "{name}"'
@@ -166,16 +171,25 @@ def _frf_keys(path: Path, places: Places) -> list[str]:
     if found.lacks_directions:
         lines.append(guessed('direction = "z"', "of the nodes, which have none in the file"))
     elif not found.ends:
-        nodes = [int(number) for number in NODE.findall(path.stem)]
-        struck = nodes[-1] if nodes else 1
-        first = nodes[0] if len(nodes) > 1 else struck
-        outputs = [places.of_sensor(number) for number in range(1, found.n_outputs + 1)]
-        inputs = [places.of_impact(number) for number in range(1, found.n_inputs + 1)]
-        if found.n_outputs == found.n_inputs == 1:
-            outputs, inputs = [places.of_impact(first)], [places.of_impact(struck)]
+        outputs, inputs = _guess_ends(path, found, places, taken)
+        taken |= {(output, input_) for output in outputs for input_ in inputs}
         lines.append(guessed(f"output_dof = {_listed(outputs)}", "of the sensors"))
         lines.append(guessed(f"input_dof = {_listed(inputs)}", "of the forces"))
     return lines
+
+
+def _guess_ends(
+    path: Path, found: FrfContents, places: Places, taken: set[tuple[str, str]]
+) -> tuple[list[str], list[str]]:
+    """Guess what FRFs connect: as the file's name says where it is one FRF, and no pair twice."""
+    nodes = [int(number) for number in NODE.findall(path.stem)]
+    struck = places.of_impact(nodes[-1] if nodes else 1)
+    if not found.n_outputs == found.n_inputs == 1:
+        outputs = [places.of_sensor(number) for number in range(1, found.n_outputs + 1)]
+        return outputs, [places.of_impact(number) for number in range(1, found.n_inputs + 1)]
+    first = places.of_impact(nodes[0]) if len(nodes) > 1 else struck
+    candidates = [first, *(places.of_sensor(number) for number in range(1, len(taken) + 2))]
+    return [next((output for output in candidates if (output, struck) not in taken), first)], [struck]
 
 
 def _quantity_of(unit: str) -> FrfQuantity | None:
