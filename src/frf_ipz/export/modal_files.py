@@ -13,7 +13,7 @@ import lazy_loader
 import numpy as np
 
 from frf_ipz.arguments import as_path, require_type
-from frf_ipz.dofs import DIRECTIONS
+from frf_ipz.dofs import DIRECTIONS, Dof
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.export.run_tables import mode_table, pole_table
 from frf_ipz.frf import FrfSet
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from frf_ipz.arrays import ComplexArray, FloatArray
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
 
 openpyxl = lazy_loader.load("openpyxl")
@@ -189,11 +189,12 @@ def _shape_lines(fit: ModalFit) -> list[str]:
     """Give data sets 55 of complex modes; a DOF without a sensor is 0."""
     modes = mode_shapes(fit)
     width = len(DIRECTIONS) if any(dof.direction.startswith("r") for dof in modes.dofs) else TRANSLATIONS
-    nodes = list(dict.fromkeys(dof.node for dof in modes.dofs))
+    dofs = [_at_node(dof) for dof in modes.dofs]
+    nodes = list(dict.fromkeys(dof.node for dof in dofs))
     lines: list[str] = []
     for mode, pole in enumerate(fit.model.poles[: fit.n_modes]):
         values = np.zeros((len(nodes), width), complex)
-        for dof, value in zip(modes.dofs, modes.shapes[:, mode], strict=True):
+        for dof, value in zip(dofs, modes.shapes[:, mode], strict=True):
             values[nodes.index(dof.node), DIRECTIONS.index(dof.direction)] = value
         hertz = float(modes.natural_frequency_hz[mode])
         lines += [END, f"{55:6d}", "frf_ipz", NONE, NONE, NONE, f"Mode {mode + 1:d} Frequency {hertz:.6g} Hz"]
@@ -220,7 +221,8 @@ def _function(
     step = float(np.mean(steps)) if len(steps) else 0.0
     is_even = len(steps) > 0 and bool(np.abs(steps - step).max() < EVEN * step)
     is_complex = kind == FRF_FUNCTION
-    ends = "".join(f" {NONE:<10}{dof.node:10d}{_direction(dof):4d}" for dof in (label.output_dof, label.input_dof))
+    dofs = _at_node(label.output_dof), _at_node(label.input_dof)
+    ends = "".join(f" {NONE:<10}{dof.node:10d}{_direction(dof):4d}" for dof in dofs)
     start = float(frequency_hz[0])
     return [
         END,
@@ -240,6 +242,14 @@ def _function(
         *_values(frequency_hz, values, is_even=is_even, is_complex=is_complex),
         END,
     ]
+
+
+def _at_node(dof: AnyDof) -> Dof:
+    if isinstance(dof, Dof):
+        return dof
+    raise InputError(
+        f"'{dof}' is a port over several DOFs, and a universal file knows nodes only; write modes.csv instead"
+    )
 
 
 def _direction(dof: Dof) -> int:

@@ -29,7 +29,7 @@ COMMON_STEPS = 17  # of the search for it, over three standard deviations to eac
 FREQUENCY_GATE = 0.3  # logarithm beyond which two poles are not the same whatever the shapes say
 AMPLITUDE_STD = 0.4  # of an amplitude, over the mean amplitude in its FRF: shapes change with the stiffness
 UNMATCHED = 9.0  # a pole stays unmatched rather than three standard deviations off
-MAX_SHAPE = 12.0  # many FRFs must not outweigh any frequency
+MAX_SHAPE = 12.0  # many FRFs must not outweigh any frequency: costs of shapes approach it
 ROUNDS = 3  # of assigning and estimating the gains in turn
 
 
@@ -73,11 +73,11 @@ def pair_poles(fit: ModalFit, model: ModelPoles) -> PolePairing:
     measured = np.log(np.abs(fit.model.poles[: fit.n_modes]))
     computed = np.log(np.abs(model.values) + np.finfo(float).tiny)
     band = np.log(2 * np.pi * np.array(fit.band_hz))
-    shapes = np.zeros((len(measured), len(computed)))
     gains = np.ones(len(fit.labels))
-    if fit.modes_given is not None:
-        shapes = _direction_costs(fit.modes_given.as_model_has_them().shapes.T, model.amplitudes)
     amplitudes, noise = measured_amplitudes(fit)
+    if fit.modes_given is not None:
+        amplitudes = np.asarray(fit.modes_given.as_model_has_them().shapes.T)
+    shapes = _direction_costs(amplitudes, model.amplitudes)  # gains are not known yet, and of a stated shape never
     for _ in range(ROUNDS if fit.labels else 0):
         best, *_ = _tried(measured, computed, shapes, band)
         gains = _gains(amplitudes, model.amplitudes, noise, best.matching.partner)
@@ -151,7 +151,13 @@ def _likely_factors(gaps: FloatArray, shapes: FloatArray, scatter: float) -> lis
 def _direction_costs(measured: ComplexArray, computed: ComplexArray) -> FloatArray:
     """Squared distance of shapes whose scale is not known: what the best factor leaves of each, as MAC has it."""
     left_over = 1 - modal_assurance(measured.T, computed.T)
-    return np.asarray(np.minimum(left_over / AMPLITUDE_STD**2 * np.sqrt(measured.shape[1]), MAX_SHAPE))
+    return _bounded(left_over / AMPLITUDE_STD**2 * np.sqrt(measured.shape[1]))
+
+
+def _bounded(costs: FloatArray) -> FloatArray:
+    """Let costs approach the largest one from its half on: a better shape costs less, however many FRFs there are."""
+    half = MAX_SHAPE / 2
+    return np.asarray(np.where(costs < half, costs, MAX_SHAPE - half**2 / np.maximum(costs, half)))
 
 
 def _gains(measured: ComplexArray, computed: ComplexArray, noise: FloatArray, partner: IntArray) -> FloatArray:
@@ -169,9 +175,19 @@ def _gains(measured: ComplexArray, computed: ComplexArray, noise: FloatArray, pa
 
 
 def _shape_costs(measured: ComplexArray, computed: ComplexArray, noise: FloatArray, gains: FloatArray) -> FloatArray:
-    """Squared distance of amplitudes, averaged over FRFs of the same information and capped."""
+    """Squared distance of amplitudes: of their directions, which MAC compares, and of their sizes.
+
+    Errors of a direction are shared by many FRFs, so their number counts with its root. The size is one number, however
+    many FRFs show it: a modal mass that is off must not hide that a direction agrees.
+    """
     scaled = measured / gains
     size = np.sqrt(np.mean(np.abs(scaled) ** 2, axis=0))
-    spread = (AMPLITUDE_STD * size) ** 2 + (noise / gains) ** 2
-    distance = np.abs(scaled[:, None, :] - computed[None]) ** 2 / spread[:, None, :]
-    return np.asarray(np.minimum(distance.mean(axis=2) * np.sqrt(measured.shape[1]), MAX_SHAPE))
+    weight = 1 / ((AMPLITUDE_STD * size) ** 2 + (noise / gains) ** 2)
+    of_measured = np.sum(weight * np.abs(scaled) ** 2, axis=1)[:, None]
+    of_computed = weight @ (np.abs(computed) ** 2).T
+    inner = (weight * scaled.conj()) @ computed.T
+    distance = of_measured - 2 * inner.real + of_computed
+    assurance = np.abs(inner) ** 2 / np.maximum(of_measured * of_computed, np.finfo(float).tiny)
+    direction = np.clip(of_measured * (1 - assurance), 0.0, distance)
+    count = measured.shape[1]
+    return _bounded((direction * np.sqrt(count) + (distance - direction)) / count)

@@ -11,9 +11,10 @@ from chains import chain, label
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel
-from frf_ipz.pairing.model_roots import ModelZeros, model_poles, model_zeros
-from frf_ipz.pairing.pair import pair_roots
+from frf_ipz.pairing.model_roots import ModelPoles, ModelZeros, model_poles, model_zeros
+from frf_ipz.pairing.pair import SURE, pair_roots
 from frf_ipz.pairing.pairs import PairVerdict
+from frf_ipz.pairing.poles import _shape_costs, pair_poles
 from frf_ipz.pairing.zeros import measured_slope_sign, pair_zeros
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.rational import PoleResidueModel, ZeroSet
@@ -269,3 +270,73 @@ def test_a_rigid_body_is_no_mode_that_could_be_measured():
         (2, 3),
         (3, 4),
     ]
+
+
+def many_frfs(n_frfs, seed, *, frequencies, measured_frequencies, order, sizes, error=0.17):
+    """Modes at random amplitudes in many FRFs; as measured in another order, of other sizes, with errors of shape."""
+    rng = np.random.default_rng(seed)
+    labels = tuple(label(place + 1, 1) for place in range(n_frfs))
+    amplitudes = rng.standard_normal((len(frequencies), n_frfs))
+    values = 2 * np.pi * np.array(frequencies) * (1j - 0.005)
+    model = ModelPoles(values=values, amplitudes=amplitudes.astype(complex))
+    poles = 2 * np.pi * np.array(measured_frequencies) * (1j - 0.005)
+    seen = (amplitudes[order] + error * rng.standard_normal((len(order), n_frfs))) * np.array(sizes)[:, None]
+    powers = np.array([frf_label.quantity.power for frf_label in labels])
+    fitted = PoleResidueModel(
+        poles=poles,
+        residues=seen / (2j * np.abs(poles))[:, None] * poles[:, None] ** powers,
+        powers=(0,),
+        coefficients=np.zeros((1, n_frfs)),
+        scale_rad_s=1.0,
+        delay_s=np.zeros(n_frfs),
+    )
+    nothing = np.zeros((len(poles), n_frfs, 2, 2))
+    std = np.diag(np.repeat((1e-5 * np.abs(poles)) ** 2, 2))
+    fit = make_modal_fit(fitted, labels, (50.0, 300.0), np.zeros(0, complex), np.zeros(0, int), [], std, nothing)
+    return pair_poles(fit, model)
+
+
+MANY = [4, 25, 100, 225, 1000]
+
+
+@pytest.mark.parametrize("n_frfs", MANY)
+@pytest.mark.parametrize("seed", range(3))
+def test_shapes_separate_swapped_modes_in_any_number_of_frfs(n_frfs, seed):
+    """MAC of 0.97, and modal masses off: with many FRFs both costs used to be cut to the same."""
+    pairing = many_frfs(
+        n_frfs,
+        seed,
+        frequencies=[100.0, 102.0, 140.0, 180.0, 205.0, 250.0],
+        measured_frequencies=[101.0, 102.6, 138.2, 182.5, 203.1, 253.0],
+        order=[1, 0, 2, 3, 4, 5],
+        sizes=[0.6, 1.7, 1.0, 1.3, 0.8, 1.0],
+    )
+    expected = [1, 0, 2, 3, 4, 5]
+    assert pairing.matching.partner.tolist() == expected
+    assert (pairing.probabilities[range(6), expected] > SURE).all()
+
+
+@pytest.mark.parametrize("n_frfs", MANY)
+def test_close_modes_of_mixed_shapes_are_told_apart_by_mac(n_frfs):
+    rng = np.random.default_rng(n_frfs)
+    shapes = rng.standard_normal((3, n_frfs))
+    mixed = np.array([0.9 * shapes[0] + 0.3 * shapes[1], 0.9 * shapes[1] - 0.3 * shapes[0]])
+    costs = _shape_costs(mixed.astype(complex), shapes.astype(complex), np.zeros((2, n_frfs)), np.ones(n_frfs))
+    assert costs[0].argmin() == 0
+    assert costs[1].argmin() == 1
+
+
+@pytest.mark.parametrize("n_frfs", MANY[1:])
+def test_every_step_of_mac_counts(n_frfs):
+    rng = np.random.default_rng(n_frfs)
+    first = rng.standard_normal(n_frfs)
+    other = rng.standard_normal(n_frfs)
+    other -= first * (first @ other) / (first @ first)
+    other *= np.linalg.norm(first) / np.linalg.norm(other)
+    assurances = np.array([0.0, 0.5, 0.9, 0.97, 1.0])
+    measured_shapes = np.sqrt(assurances)[:, None] * first + np.sqrt(1 - assurances)[:, None] * other
+    costs = _shape_costs(
+        1.6 * measured_shapes.astype(complex), first[None].astype(complex), np.zeros((5, n_frfs)), np.ones(n_frfs)
+    )[:, 0]
+    assert (np.diff(costs) < 0).all()
+    assert costs[0] - costs[3] > 4.0  # odds of e^2
