@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,6 +66,21 @@ class RootCovariance:
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:  # noqa: ANN401, FBT001 - NumPy's protocol
         del copy
         return np.asarray(self[:, :], dtype)
+
+    def select(self, rows: IntArray) -> RootCovariance:
+        """Select roots.
+
+        Parameters
+        ----------
+        rows : (k,) int array
+            Rows, which are the columns too.
+
+        Returns
+        -------
+        RootCovariance
+            Of these.
+        """
+        return RootCovariance(common=self.common[rows], blocks=sparse.csr_array(self.blocks[rows][:, rows]))
 
     def diagonal(self) -> FloatArray:
         """Variances.

@@ -88,6 +88,13 @@ def pair_probabilities(costs: FloatArray, row_unmatched: FloatArray, column_unma
     n_rows, n_columns = costs.shape
     if not n_rows:
         return np.zeros((0, n_columns + 1))
+    within_reach = np.isfinite(costs).any(axis=0)
+    if not within_reach.all():  # what no row may take has no part in it
+        probabilities = np.zeros((n_rows, n_columns + 1))
+        probabilities[:, [*np.flatnonzero(within_reach), n_columns]] = pair_probabilities(
+            costs[:, within_reach], row_unmatched, column_unmatched[within_reach]
+        )
+        return probabilities
     table = _with_unmatched(costs, row_unmatched, column_unmatched)
     _, holder_of = linear_sum_assignment(table)  # column of each row
     rise = table[:, holder_of] - table[np.arange(len(table)), holder_of][:, None]  # row takes the column of another row

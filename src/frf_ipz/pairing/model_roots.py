@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
-from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros
+from frf_ipz.numerics.pencils import Roots, damped_poles
+from frf_ipz.numerics.pole_forms import every_damped_zero
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.structure import ReducedModel
@@ -105,24 +108,28 @@ def model_shapes(model: ReducedModel, dofs: tuple[AnyDof, ...]) -> ModelPoles:
     return ModelPoles(values=roots.values, amplitudes=(shapes / modal_mass).T)
 
 
-def model_zeros(model: ReducedModel, label: FrfLabel) -> ModelZeros:
-    """Compute the zeros of one FRF of a model.
+def model_zeros(model: ReducedModel, labels: Sequence[FrfLabel]) -> list[ModelZeros]:
+    """Compute the zeros of FRFs of a model.
 
     Parameters
     ----------
     model : ReducedModel
         The model.
-    label : FrfLabel
-        Which FRF.
+    labels : sequence of FrfLabel
+        Which FRFs.
 
     Returns
     -------
-    ModelZeros
-        The finite ones.
+    list of ModelZeros
+        The finite ones of each.
     """
-    output, force = model.row(label.output_dof), model.row(label.input_dof)
-    roots = damped_zeros(model.mass, model.damping, model.stiffness, output, force)
-    upper = roots.take(np.flatnonzero(roots.values.imag >= -REAL * np.abs(roots.values)))
+    outputs = np.array([model.row(label.output_dof) for label in labels])
+    inputs = np.array([model.row(label.input_dof) for label in labels])
+    every = every_damped_zero(model.mass, model.damping, model.stiffness, outputs, inputs)
+    return [_zeros_of(model, *frf) for frf in zip(every, outputs, inputs, strict=True)]
+
+
+def _zeros_of(model: ReducedModel, upper: Roots, output: FloatArray, force: FloatArray) -> ModelZeros:
     order = np.argsort(np.abs(upper.values), kind="stable")
     upper = upper.take(order)
     kinds, is_listed = _kinds(upper.values)

@@ -71,10 +71,10 @@ def pair_roots(fit: ModalFit, reduced_model: ReducedModel) -> Pairs:
     pole_pairing = pair_poles(fit, poles)
     rows = _pole_rows(fit, poles, pole_pairing)
     paired_poles = _paired_logs(rows)
-    for frf in range(len(fit.labels)):
-        zeros = model_zeros(reduced_model, fit.labels[frf])
+    zero_std = np.sqrt(np.maximum(fit.covariance.diagonal()[2 * fit.n_modes + 1 :: 2], 0.0))
+    for frf, zeros in enumerate(model_zeros(reduced_model, fit.labels)):
         zero_pairing = pair_zeros(fit, frf, zeros, paired_poles, float(pole_pairing.gains[frf]))
-        rows += _zero_rows(fit, frf, zeros, zero_pairing, paired_poles)
+        rows += _zero_rows(fit, frf, zeros, zero_pairing, paired_poles, zero_std)
     return Pairs(rows=tuple(rows), labels=fit.labels, warnings=tuple(_warnings(rows, pole_pairing, fit.labels)))
 
 
@@ -97,14 +97,19 @@ def _pole_rows(fit: ModalFit, model: ModelPoles, pairing: PolePairing) -> list[P
 
 
 def _zero_rows(
-    fit: ModalFit, frf: int, model: ModelZeros, pairing: ZeroPairing, paired_poles: tuple[FloatArray, FloatArray]
+    fit: ModalFit,
+    frf: int,
+    model: ModelZeros,
+    pairing: ZeroPairing,
+    paired_poles: tuple[FloatArray, FloatArray],
+    zero_std: FloatArray,
 ) -> list[Pair]:
     rows = []
     for row, zero in enumerate(pairing.measured):
         value = fit.zeros.values[zero]
         partner = int(pairing.matching.partner[row])
         verdict, reason = _verdict(partner, pairing.probabilities[row], model.values, "zero")
-        verdict, reason = _exclusion(fit, int(zero)) or (verdict, reason)
+        verdict, reason = _exclusion(fit, int(zero), float(zero_std[zero])) or (verdict, reason)
         rows.append(_row("zero", frf, int(zero), partner, value, model.values, pairing, verdict, reason, row=row))
     inside = in_band(model.values, fit.band_hz, paired_poles) & (np.array(model.kind) != "real")
     for zero in np.setdiff1d(np.flatnonzero(inside), pairing.matching.partner):
@@ -128,15 +133,13 @@ def _verdict(partner: int, probability: FloatArray, computed: np.ndarray, what: 
     )
 
 
-def _exclusion(fit: ModalFit, zero: int) -> tuple[PairVerdict, str] | None:
+def _exclusion(fit: ModalFit, zero: int, std: float) -> tuple[PairVerdict, str] | None:
     """PairVerdict and reason for a measured zero that must not become a target; None for one that may."""
     zeros = fit.zeros
     if not zeros.identifiable[zero]:
         return PairVerdict.AMBIGUOUS, f"not identifiable: {zeros.reason[zero]}"
     if zeros.kind[zero] == "real":
         return PairVerdict.AMBIGUOUS, "a real zero: no measured line shows where it is"
-    start = 2 * (fit.n_modes + zero)
-    std = float(np.sqrt(max(fit.covariance[start + 1, start + 1], 0.0)))
     poles = fit.model.poles[: fit.n_modes]
     distance = np.abs(poles - zeros.values[zero])
     if len(poles) and distance.min() < CANCELLING * std:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.numerics.pencils import damped_zeros
+from frf_ipz.numerics.pole_forms import every_damped_zero
 from frf_ipz.pairing.model_roots import model_zeros
 from frf_ipz.rational import ZeroSet
 
@@ -51,14 +51,14 @@ def predicted_zeros(
     frf: list[int] = []
     kinds: list[str] = []
     spread: list[tuple[float, float, float]] = []
-    for number, label in enumerate(labels):
-        zeros = model_zeros(model, label)
+    of_members = _zeros_of_members(model, ensemble[:MAX_MEMBERS], labels)
+    for number, zeros in enumerate(model_zeros(model, labels)):
         inside = (np.abs(zeros.values) > band_rad_s[0]) & (np.abs(zeros.values) < band_rad_s[1])
         indices = np.flatnonzero(inside & (np.array(zeros.kind) != "real"))
         values += zeros.values[indices].tolist()
         kinds += [zeros.kind[index] for index in indices]
         frf += [number] * len(indices)
-        spread += _spread(model, ensemble[:MAX_MEMBERS], label, zeros.values[indices])
+        spread += _spread([member[number] for member in of_members], zeros.values[indices])
     std = np.array(spread, float).reshape(-1, 3)
     reasons = tuple(_reason(value, row) for value, row in zip(values, std, strict=True))
     zero_set = ZeroSet(
@@ -71,17 +71,25 @@ def predicted_zeros(
     return zero_set, std[:, :2]
 
 
-def _spread(
-    model: ReducedModel, ensemble: FloatArray, label: FrfLabel, values: ComplexArray
-) -> list[tuple[float, float, float]]:
+def _zeros_of_members(
+    model: ReducedModel, ensemble: FloatArray, labels: Sequence[FrfLabel]
+) -> list[list[ComplexArray]]:
+    """Zeros of every FRF, of each member."""
+    outputs = np.array([model.row(label.output_dof) for label in labels])
+    inputs = np.array([model.row(label.input_dof) for label in labels])
+    return [
+        [roots.values for roots in every_damped_zero(mass, damping, stiffness, outputs, inputs)]
+        for mass, damping, stiffness in ensemble
+    ]
+
+
+def _spread(of_members: list[ComplexArray], values: ComplexArray) -> list[tuple[float, float, float]]:
     """Give standard deviations of real and imaginary parts, and the part of the members that have the zero."""
-    if not len(ensemble) or not len(values):
+    if not len(of_members) or not len(values):
         return [(np.nan, np.nan, np.nan)] * len(values)
-    output, force = model.row(label.output_dof), model.row(label.input_dof)
-    nearest = np.full((len(ensemble), len(values)), complex(np.nan, np.nan))
-    for member, (mass, damping, stiffness) in enumerate(ensemble):
-        roots = damped_zeros(mass, damping, stiffness, output, force).values
-        roots = roots[roots.imag > 0]
+    nearest = np.full((len(of_members), len(values)), complex(np.nan, np.nan))
+    for member, zeros in enumerate(of_members):
+        roots = zeros[zeros.imag > 0]
         distance = np.abs(roots[:, None] - values) / np.abs(values)
         best = distance.argmin(axis=0)
         is_same = distance[best, np.arange(len(values))] < SAME_ZERO
@@ -94,7 +102,7 @@ def _spread(
             float(np.median(np.abs(part))) / GAUSSIAN if len(deviation) else np.nan
             for part in (deviation.real, deviation.imag)
         )
-        result.append((real, imag, len(deviation) / len(ensemble)))
+        result.append((real, imag, len(deviation) / len(of_members)))
     return result
 
 

@@ -13,8 +13,9 @@ import pandas as pd
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.numerics.pencils import undamped_poles
-from frf_ipz.updating.gaussian import solve_step
+from frf_ipz.updating.gaussian import linearise, solve_step
 from frf_ipz.updating.parameters import make_structural_basis
+from frf_ipz.updating.target_noise import TargetNoise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -64,8 +65,9 @@ def change_along_structure(updated: UpdatedModel, fe_model: StructuralModel) -> 
     changes = _relative_changes(updated.nominal, np.concatenate([basis.stiffness, [_stiffness_change(updated)]]))
     by_parts, change = changes[:-1].T, changes[-1]
     root = np.hstack([term.std * term.root for term in basis.terms])
-    noise = (READ_BACK * max(np.abs(change).max(), np.finfo(float).tiny)) ** 2 * np.eye(len(change))
-    theta = root @ solve_step(by_parts @ root, change, noise).mean
+    size = max(np.abs(change).max(), np.finfo(float).tiny)
+    noise = TargetNoise(common=np.zeros((len(change), 0)), blocks=(READ_BACK**2 * np.ones((1, 1)),) * len(change))
+    theta = root @ solve_step(linearise([by_parts @ root / size], change / size, noise), np.ones(1)).mean
     return part_table(basis.regions, 1 + theta[: len(basis.regions)])
 
 

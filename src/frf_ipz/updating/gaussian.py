@@ -8,6 +8,10 @@ doi:10.1162/neco.1992.4.3.415), each with a log-normal prior.
 How closely targets are met follows from the discrepancy principle: the weighted misfit must not exceed their number.
 Where the most likely change leaves a larger misfit, the targets contradict one another (or a reduced model cannot
 express them), and the slack, a variance on top of their covariance, grows until it does not.
+
+Whatever is computed of n data costs ``n k^2`` for k parameters. The covariance of the data, their slack left out, is
+diagonalised once (`Linearised`), block by block and in units of the slack; the errors that all data share become
+parameters of unit variance. From there on every slack is a number on a diagonal.
 """
 
 from __future__ import annotations
@@ -16,116 +20,354 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import Bounds, minimize
+from scipy.linalg import cho_solve, cholesky, lapack
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import BoolArray, FloatArray
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from frf_ipz.updating.parameters import PriorTerm
+    from frf_ipz.updating.target_noise import TargetNoise
 
 GROWTH = 1.5  # of the slack from trial to trial
 MAX_TRIALS = 40  # up to ten million times the slack
 MAX_SCALE_STEPS = 25  # the evidence is flat near its top: more steps change nothing that matters
 MAX_DEVIATION = 6.0  # standard deviations of a scale's prior within which the search stays: a line search may overflow
+LARGEST_SCALE_STEP = 2.0  # of the logarithm of a scale in one step
+FLAT = 1e-2  # of the logarithm of the evidence: what a further step would gain is nothing
+MAX_HALVINGS = 10
+ROWS_AT_ONCE = 4096
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GaussianStep:
-    """Posterior mean of a linear step, and the gain that draws from the posterior need.
+    """Posterior mean of a linear step, and what draws from the posterior need.
 
     Parameters
     ----------
     mean : (k,) array
         Whitened parameters.
-    gain : (k, n) array
-        ``G^T (G G^T + R)^-1``.
     misfit : float
         ``(d - G mean)^T R^-1 (d - G mean)``, to be compared with the number of data.
     n_determined : float
-        Effective number of data that determine parameters against the prior: the trace of ``G gain``.
+        Effective number of data that determine parameters against the prior: the trace of ``G^T (G G^T + R)^-1 G``.
+    root : (c + k, c + k) array
+        Upper Cholesky factor of the information about the errors that all data share, and about the parameters.
     """
 
     mean: FloatArray
-    gain: FloatArray
     misfit: float
     n_determined: float
+    root: FloatArray
 
 
-def solve_step(sensitivity: FloatArray, data: FloatArray, noise: FloatArray) -> GaussianStep:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Linearised:
+    """Linear data in coordinates in which their noise is diagonal, whatever the slack.
+
+    Parameters
+    ----------
+    data : (n,) array
+        d, in units of the slack.
+    parts : tuple of (n, m_i) arrays
+        Sensitivity to each prior term's unit normal numbers, for a standard deviation of 1; where they are more than
+        the data, to as many combinations of them as there are data.
+    bases : tuple of (k_i, m_i) arrays, or None
+        These combinations, orthonormal; None where they are the numbers themselves.
+    common : (n, c) array
+        Sensitivity to the errors that all data share.
+    level : (n,) array
+        Variance for a slack of 0.
+    log_slack : float
+        Sum of the logarithms of the units.
+    axes : tuple of (m, m) arrays
+        Directions of each block, by columns, in units of the slack.
+    slack : (n,) array
+        The units.
+    """
+
+    data: FloatArray
+    parts: tuple[FloatArray, ...]
+    bases: tuple[FloatArray | None, ...]
+    common: FloatArray
+    level: FloatArray
+    axes: tuple[FloatArray, ...]
+    slack: FloatArray
+
+    def rotated(self, rows: FloatArray) -> FloatArray:
+        """Express numbers of the data in these coordinates.
+
+        Parameters
+        ----------
+        rows : (n, ...) array
+            One a datum.
+
+        Returns
+        -------
+        (n, ...) array
+            The same.
+        """
+        return _rotated(self.axes, self.slack, rows)
+
+    def square(self, error: FloatArray, factor: float) -> float:
+        """Weigh an error by the inverse of the noise.
+
+        Parameters
+        ----------
+        error : (n,) array
+            Of the data, as they were given.
+        factor : float
+            On the slack.
+
+        Returns
+        -------
+        float
+            ``e^T R^-1 e``.
+        """
+        return self._square(self.rotated(error), factor)
+
+    def _square(self, turned: FloatArray, factor: float) -> float:
+        weights = 1 / (self.level + factor**2)
+        whole = float(weights @ turned**2)
+        if not self.common.shape[1]:
+            return whole
+        weighted = self.common * weights[:, None]
+        shared = weighted.T @ turned
+        information = np.eye(len(shared)) + weighted.T @ self.common
+        return whole - float(shared @ np.linalg.solve(information, shared))
+
+    def columns(self, scales: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
+        """Give the sensitivity to shared errors and scaled parameters, some rows at a time.
+
+        Parameters
+        ----------
+        scales : (t,) array
+            Standard deviations of the terms.
+
+        Yields
+        ------
+        slice, (m, c + k) array
+            Rows, and their sensitivity.
+        """
+        for first in range(0, len(self.data), ROWS_AT_ONCE):
+            rows = slice(first, first + ROWS_AT_ONCE)
+            scaled = [scale * part[rows] for scale, part in zip(scales, self.parts, strict=True)]
+            yield rows, np.hstack([self.common[rows], *scaled])
+
+    def sensitivity(self, scales: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
+        """Give the sensitivity of the data, as they were given, to scaled combinations, block by block.
+
+        Parameters
+        ----------
+        scales : (t,) array
+            Standard deviations of the terms.
+
+        Yields
+        ------
+        slice, (m, k) array
+            Rows, and their sensitivity.
+        """
+        first = 0
+        for vectors in self.axes:
+            rows = slice(first, first + len(vectors))
+            scaled = [scale * part[rows] for scale, part in zip(scales, self.parts, strict=True)]
+            yield rows, self.slack[rows, None] * (vectors @ np.hstack(scaled))
+            first += len(vectors)
+
+    def whole(self, combined: FloatArray) -> FloatArray:
+        """Turn values of the combinations into those of all whitened parameters.
+
+        Parameters
+        ----------
+        combined : (..., m) array
+            Of the combinations.
+
+        Returns
+        -------
+        (..., k) array
+            Of the parameters.
+        """
+        ends = np.cumsum([part.shape[1] for part in self.parts])[:-1]
+        pieces = np.split(combined, ends, axis=-1)
+        return np.concatenate(
+            [p if basis is None else p @ basis.T for p, basis in zip(pieces, self.bases, strict=True)], axis=-1
+        )
+
+    def combined(self, whole: FloatArray) -> FloatArray:
+        """Turn values of all whitened parameters into those of the combinations.
+
+        Parameters
+        ----------
+        whole : (..., k) array
+            Of the parameters.
+
+        Returns
+        -------
+        (..., m) array
+            Of the combinations.
+        """
+        sizes = [p.shape[1] if b is None else len(b) for p, b in zip(self.parts, self.bases, strict=True)]
+        pieces = np.split(whole, np.cumsum(sizes)[:-1], axis=-1)
+        return np.concatenate(
+            [p if basis is None else p @ basis for p, basis in zip(pieces, self.bases, strict=True)], axis=-1
+        )
+
+    def information(self, scales: FloatArray, factor: float) -> tuple[FloatArray, FloatArray]:
+        """Give the information of shared errors and parameters, with that of their prior.
+
+        Parameters
+        ----------
+        scales : (t,) array
+            Standard deviations of the terms.
+        factor : float
+            On the slack.
+
+        Returns
+        -------
+        root : (c + k, c + k) array
+            Its upper Cholesky factor.
+        right : (c + k,) array
+            Weighted data.
+        """
+        size = self.common.shape[1] + sum(part.shape[1] for part in self.parts)
+        information, right = np.eye(size), np.zeros(size)
+        weights = 1 / (self.level + factor**2)
+        for rows, columns in self.columns(scales):
+            weighted = columns * np.sqrt(weights[rows])[:, None]
+            information += weighted.T @ weighted
+            right += weighted.T @ (np.sqrt(weights[rows]) * self.data[rows])
+        return cholesky(information, check_finite=False), right
+
+
+def linearise(
+    parts: Sequence[FloatArray], data: FloatArray, noise: TargetNoise, slack: FloatArray | None = None
+) -> Linearised:
+    """Diagonalise the noise of linear data.
+
+    Parameters
+    ----------
+    parts : sequence of (n, k_i) arrays
+        Sensitivity of the data to each term's unit normal numbers, for a standard deviation of 1.
+    data : (n,) array
+        d.
+    noise : TargetNoise
+        R without slack, positive definite.
+    slack : (n,) array, optional
+        Standard deviations of what no parameter explains, for a factor of 1.
+
+    Returns
+    -------
+    Linearised
+        The same data.
+    """
+    units = np.ones(len(data)) if slack is None else slack
+    levels, axes = [], []
+    for part, block in noise.parts():
+        values, vectors = np.linalg.eigh(block / np.outer(units[part], units[part]))
+        levels.append(np.maximum(values, np.finfo(float).tiny))
+        axes.append(vectors)
+    turned = tuple(axes)
+    combined = [_combined(_rotated(turned, units, part)) for part in parts]
+    return Linearised(
+        data=_rotated(turned, units, data),
+        parts=tuple(part for part, _ in combined),
+        bases=tuple(basis for _, basis in combined),
+        common=_rotated(turned, units, noise.common),
+        level=np.concatenate(levels) if levels else np.zeros(0),
+        axes=turned,
+        slack=units,
+    )
+
+
+def _combined(part: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+    """At most as many numbers as data: the prior is the same along all orthonormal combinations."""
+    if part.shape[1] <= part.shape[0]:
+        return part, None
+    basis, triangle = np.linalg.qr(part.T)
+    return triangle.T, basis
+
+
+def _rotated(axes: tuple[FloatArray, ...], slack: FloatArray, rows: FloatArray) -> FloatArray:
+    result = np.empty(rows.shape)
+    first = 0
+    for vectors in axes:
+        part = slice(first, first + len(vectors))
+        units = slack[part] if rows.ndim == 1 else slack[part, None]
+        result[part] = vectors.T @ (rows[part] / units)
+        first += len(vectors)
+    return result
+
+
+def solve_step(linear: Linearised, scales: FloatArray, factor: float = 0.0) -> GaussianStep:
     """Mean of the whitened parameters, given linear data.
 
     Parameters
     ----------
-    sensitivity : (n, k) array
-        G, by whitened parameters.
-    data : (n,) array
-        d.
-    noise : (n, n) array
-        R, positive definite.
+    linear : Linearised
+        The data.
+    scales : (t,) array
+        Standard deviations of the terms.
+    factor : float
+        On the slack.
 
     Returns
     -------
     GaussianStep
         The posterior.
     """
-    total = sensitivity @ sensitivity.T + noise
-    gain = cho_solve(cho_factor(total), sensitivity).T
-    mean = gain @ data
-    error = data - sensitivity @ mean
+    root, right = linear.information(scales, factor)
+    n_common = linear.common.shape[1]
+    mean = cho_solve((root, False), right, check_finite=False)[n_common:]
+    inverse_root = lapack.dtrtri(root)[0][n_common:]
+    error = linear.data.copy()
+    for rows, columns in linear.columns(scales):
+        error[rows] -= columns[:, n_common:] @ mean
     return GaussianStep(
-        mean=mean,
-        gain=gain,
-        misfit=float(error @ cho_solve(cho_factor(noise), error)),
-        n_determined=float(np.einsum("nk,kn->", sensitivity, gain)),
+        mean=linear.whole(mean),
+        misfit=linear._square(error, factor),
+        n_determined=float(len(mean) - np.sum(inverse_root**2)),
+        root=root,
     )
 
 
-def slack_by_discrepancy(
-    sensitivity: FloatArray, data: FloatArray, noise: FloatArray, slack: FloatArray, factor: float
-) -> float:
+def step_by_discrepancy(linear: Linearised, scales: FloatArray, factor: float) -> tuple[GaussianStep, float]:
     """Find the smallest factor on the slack with which the misfit is no more than the number of data.
 
     Parameters
     ----------
-    sensitivity : (n, k) array
-        G.
-    data : (n,) array
-        d.
-    noise : (n, n) array
-        Covariance of the targets.
-    slack : (n,) array
-        Standard deviations of what no parameter explains, for a factor of 1.
+    linear : Linearised
+        The data.
+    scales : (t,) array
+        Standard deviations of the terms.
     factor : float
         The most likely factor, where the search starts.
 
     Returns
     -------
-    float
+    step : GaussianStep
+        The posterior with that factor.
+    factor : float
         The factor by the discrepancy principle, to within its growth from trial to trial.
     """
-    for _ in range(MAX_TRIALS):
-        if solve_step(sensitivity, data, noise + np.diag((factor * slack) ** 2)).misfit <= len(data):
+    step = solve_step(linear, scales, factor)
+    for _ in range(MAX_TRIALS - 1):
+        if step.misfit <= len(linear.data):
             break
         factor *= GROWTH
-    return factor
+        step = solve_step(linear, scales, factor)
+    return step, factor
 
 
-def most_contradicted(
-    sensitivity: FloatArray, data: FloatArray, noise: FloatArray, limit: float, *, least: float = 0.0
-) -> int:
+def most_contradicted(linear: Linearised, scales: FloatArray, limit: float, *, least: float = 0.0) -> int:
     """Find the datum that all other data and the prior contradict most.
 
     Parameters
     ----------
-    sensitivity : (n, k) array
-        G.
-    data : (n,) array
-        d.
-    noise : (n, n) array
-        R.
+    linear : Linearised
+        The data, without slack.
+    scales : (t,) array
+        Standard deviations of the terms.
     limit : float
         Standard deviations from the prediction by the other data beyond which a datum is contradicted.
     least : float
@@ -136,14 +378,37 @@ def most_contradicted(
     int
         Its index; -1 where none is beyond the limit.
     """
-    inverse = np.linalg.inv(sensitivity @ sensitivity.T + noise)
-    distance = np.where(np.abs(data) >= least, np.abs(inverse @ data) / np.sqrt(np.diagonal(inverse)), 0.0)
+    root, right = linear.information(scales, 0.0)
+    mean = cho_solve((root, False), right, check_finite=False)
+    weights = 1 / linear.level
+    weighted_error, explained = np.empty(len(weights)), np.empty(len(weights))
+    data, own = np.empty(len(weights)), np.empty(len(weights))
+    inverse_root = lapack.dtrtri(root)[0]
+    places = np.cumsum([0, *(len(vectors) for vectors in linear.axes)])
+    for number, vectors in enumerate(linear.axes):
+        rows = slice(places[number], places[number + 1])
+        columns = np.hstack(
+            [linear.common[rows], *(s * part[rows] for s, part in zip(scales, linear.parts, strict=True))]
+        )
+        weighted_error[rows] = vectors @ (weights[rows] * (linear.data[rows] - columns @ mean))
+        explained[rows] = np.sum((vectors @ (weights[rows, None] * (columns @ inverse_root))) ** 2, axis=1)
+        own[rows] = vectors**2 @ weights[rows]
+        data[rows] = vectors @ linear.data[rows]
+    remaining = np.maximum(own - explained, np.finfo(float).tiny)
+    distance = np.where(np.abs(data) >= least, np.abs(weighted_error) / np.sqrt(remaining), 0.0)
     worst = int(np.argmax(distance))
     return worst if distance[worst] > limit else -1
 
 
 def draw_posterior(
-    step: GaussianStep, sensitivity: FloatArray, noise: FloatArray, rng: np.random.Generator, count: int
+    step: GaussianStep,
+    linear: Linearised,
+    scales: FloatArray,
+    noise: TargetNoise,
+    rng: np.random.Generator,
+    count: int,
+    *,
+    factor: float,
 ) -> FloatArray:
     """Draw whitened parameters from the posterior: a draw of the prior, corrected by its data.
 
@@ -151,40 +416,49 @@ def draw_posterior(
     ----------
     step : GaussianStep
         The posterior.
-    sensitivity : (n, k) array
-        G.
-    noise : (n, n) array
-        R.
+    linear : Linearised
+        The data.
+    scales : (t,) array
+        Standard deviations of the terms.
+    noise : TargetNoise
+        Of the data, with their slack.
     rng : Generator
         Source of randomness.
     count : int
         Number of draws.
+    factor : float
+        On the slack.
 
     Returns
     -------
     (count, k) array
         Draws.
     """
-    prior = rng.standard_normal((count, sensitivity.shape[1]))
-    errors = rng.standard_normal((count, len(noise))) @ np.linalg.cholesky(noise).T
-    return np.asarray(step.mean + prior - (prior @ sensitivity.T + errors) @ step.gain.T)
+    prior = rng.standard_normal((count, len(step.mean)))
+    chosen = linear.combined(prior)
+    errors = linear.rotated(noise.draw(rng.standard_normal((count, len(linear.data)))).T)
+    n_common = linear.common.shape[1]
+    weights = 1 / (linear.level + factor**2)
+    right = np.zeros((len(step.root), count))
+    for rows, columns in linear.columns(scales):
+        pretended = columns[:, n_common:] @ chosen.T + errors[rows]
+        right += columns.T @ (weights[rows, None] * pretended)
+    correction = cho_solve((step.root, False), right, check_finite=False)[n_common:]
+    return np.asarray(step.mean + prior - linear.whole(correction.T))
 
 
-def most_likely_scales(
-    parts: Sequence[FloatArray], terms: Sequence[PriorTerm], data: FloatArray, noise: FloatArray, start: FloatArray
-) -> FloatArray:
+def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: FloatArray) -> FloatArray:
     """Find the standard deviations of the prior terms under which the data are most likely.
+
+    Fisher's scoring on their logarithms: the expected curvature of the evidence comes with its slope.
 
     Parameters
     ----------
-    parts : sequence of (n, k_i) arrays
-        Sensitivity of the data to each term's unit normal numbers, for a standard deviation of 1.
+    linear : Linearised
+        The data.
     terms : sequence of PriorTerm
-        The terms, with the priors of their standard deviations.
-    data : (n,) array
-        d.
-    noise : (n, n) array
-        R.
+        The terms, with the priors of their standard deviations; one more than the data have parts, where the last is
+        the slack.
     start : (t,) array
         Standard deviations to start from.
 
@@ -194,34 +468,108 @@ def most_likely_scales(
         Standard deviations; fixed ones as they were.
     """
     free = np.array([term.scale_uncertainty > 0 for term in terms])
-    if not free.any() or not len(data):
+    if not free.any() or not len(linear.data):
         return start
-    covariances = np.array([part @ part.T for part in parts])
-    prior_mean = np.log([term.std for term in terms])
-    prior_std = np.array([term.scale_uncertainty for term in terms])
-
-    def cost(logs: FloatArray) -> tuple[float, FloatArray]:
-        log_scales = np.log(start)
-        log_scales[free] = logs
-        weights = np.exp(2 * log_scales)
-        factor, _ = cho_factor(np.tensordot(weights, covariances, 1) + noise, lower=True)
-        solved = cho_solve((factor, True), data)
-        inverse = cho_solve((factor, True), np.eye(len(data)))
-        deviation = (logs - prior_mean[free]) / prior_std[free]
-        value = 0.5 * data @ solved + np.log(np.diagonal(factor)).sum() + 0.5 * deviation @ deviation
-        traces = np.einsum("tnm,nm->t", covariances, inverse - np.outer(solved, solved))
-        return float(value), (weights * traces)[free] + deviation / prior_std[free]
-
-    limit = MAX_DEVIATION * prior_std[free]
-    low, high = prior_mean[free] - limit, prior_mean[free] + limit
-    optimum = minimize(
-        cost,
-        np.clip(np.log(start)[free], low, high),
-        jac=True,
-        method="L-BFGS-B",
-        bounds=Bounds(low, high),
-        options={"maxiter": MAX_SCALE_STEPS},
-    )
+    search = _ScaleSearch(linear, terms, free, start)
+    logs = np.clip(np.log(start)[free], search.low, search.high)
+    value, slope, curvature = search.evaluate(logs)
+    for _ in range(MAX_SCALE_STEPS):
+        held = ((logs <= search.low) & (slope > 0)) | ((logs >= search.high) & (slope < 0))
+        step = np.zeros(len(logs))
+        open_ones = np.flatnonzero(~held)
+        if len(open_ones):
+            step[open_ones] = -np.linalg.solve(curvature[np.ix_(open_ones, open_ones)], slope[open_ones])
+        step *= min(1.0, LARGEST_SCALE_STEP / max(float(np.abs(step).max()), np.finfo(float).tiny))
+        gain = -0.5 * float(slope @ step)
+        if gain < FLAT:
+            logs = np.clip(logs + step, search.low, search.high)
+            break
+        for _ in range(MAX_HALVINGS):
+            tried = np.clip(logs + step, search.low, search.high)
+            new = search.evaluate(tried)
+            if new[0] <= value:
+                break
+            step /= 2
+        else:
+            break
+        logs = tried
+        value, slope, curvature = new
     scales = start.copy()
-    scales[free] = np.exp(optimum.x)
+    scales[free] = np.exp(logs)
     return scales
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _ScaleSearch:
+    """Minus the logarithm of the evidence, by the logarithms of the free scales."""
+
+    linear: Linearised
+    terms: Sequence[PriorTerm]
+    free: BoolArray
+    start: FloatArray
+
+    @property
+    def _center(self) -> FloatArray:
+        return np.log([term.std for term in self.terms])[self.free]
+
+    @property
+    def _spread(self) -> FloatArray:
+        return np.array([term.scale_uncertainty for term in self.terms])[self.free]
+
+    @property
+    def low(self) -> FloatArray:
+        """Least logarithms."""
+        return np.asarray(self._center - MAX_DEVIATION * self._spread)
+
+    @property
+    def high(self) -> FloatArray:
+        """Largest logarithms."""
+        return np.asarray(self._center + MAX_DEVIATION * self._spread)
+
+    def evaluate(self, logs: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Value, slope and expected curvature."""
+        scales = self.start.copy()
+        scales[self.free] = np.exp(logs)
+        linear, count = self.linear, len(self.linear.parts)
+        has_slack = len(self.terms) > count
+        factor = float(scales[-1]) if has_slack else 0.0
+        root, right = linear.information(scales[:count], factor)
+        mean = cho_solve((root, False), right, check_finite=False)
+        inverse_root = lapack.dtrtri(root)[0]
+        covariance = inverse_root @ inverse_root.T
+        weights = 1 / (linear.level + factor**2)
+        value = 0.5 * float(weights @ linear.data**2 - right @ mean) + float(np.log(np.diagonal(root)).sum())
+        value -= 0.5 * float(np.log(weights).sum())
+        ends = np.cumsum([linear.common.shape[1], *(part.shape[1] for part in linear.parts)])
+        places = [slice(first, end) for first, end in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)]
+        told = np.eye(len(mean)) - covariance
+        slope, curvature = np.zeros(len(self.terms)), np.zeros((len(self.terms),) * 2)
+        for number, place in enumerate(places):
+            slope[number] = np.trace(told[place, place]) - mean[place] @ mean[place]
+            for other, its_place in enumerate(places):
+                curvature[number, other] = 2 * float(np.sum(told[place, its_place] ** 2))
+        if has_slack and self.free[-1]:
+            slope[-1], curvature[-1] = self._by_slack(scales[:count], factor, mean, covariance, places)
+            curvature[:, -1] = curvature[-1]
+        deviation = (logs - self._center) / self._spread
+        value += 0.5 * float(deviation @ deviation)
+        curvature = curvature[np.ix_(self.free, self.free)] + np.diag(1 / self._spread**2)
+        return value, slope[self.free] + deviation / self._spread, curvature
+
+    def _by_slack(
+        self, scales: FloatArray, factor: float, mean: FloatArray, covariance: FloatArray, places: list[slice]
+    ) -> tuple[float, FloatArray]:
+        """Slope by the logarithm of the slack, and its row of the expected curvature."""
+        linear, square = self.linear, factor**2
+        weights = 1 / (linear.level + square)
+        slope, row = 0.0, np.zeros(len(places) + 1)
+        for rows, columns in linear.columns(scales):
+            weight = weights[rows]
+            solved = columns @ covariance
+            own = weight - weight**2 * np.einsum("ij,ij->i", solved, columns)
+            error = weight * (linear.data[rows] - columns @ mean)
+            slope += square * float(own.sum() - error @ error)
+            for number, place in enumerate(places):
+                row[number] += 2 * square * float(np.sum((weight[:, None] * solved[:, place]) ** 2))
+            row[-1] += 2 * square**2 * float(np.sum(own**2))
+        return slope, row

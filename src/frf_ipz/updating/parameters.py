@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import sparse
 from scipy.spatial.distance import cdist
 
 from frf_ipz.arguments import require_type
@@ -65,6 +66,21 @@ class PriorTerm(Concise):
     root: FloatArray
     std: float
     scale_uncertainty: float = SCALE_UNCERTAINTY
+
+    def by_whitened(self, slopes: FloatArray) -> FloatArray:
+        """Turn derivatives by parameters into those by this term's unit normal numbers, for a `std` of 1.
+
+        Parameters
+        ----------
+        slopes : (n, p) array
+            By the parameters.
+
+        Returns
+        -------
+        (n, k) array
+            ``slopes @ root``: most parameters depend on one number only.
+        """
+        return np.asarray((sparse.csr_array(self.root).T @ slopes.T).T)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)

@@ -6,13 +6,14 @@ of the input changes by dr, the zero z of H = r_o D^-1 r_i moves by - dH(z) / H'
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.dofs import AnyDof
+from frf_ipz.identification.root_covariance import RootCovariance
 
 if TYPE_CHECKING:
     from frf_ipz.updating.problem import UpdateProblem
@@ -59,7 +60,9 @@ class PositionUncertainty:
     row: FloatArray
 
 
-def with_position_uncertainty(problem: UpdateProblem, misplacements: tuple[PositionUncertainty, ...]) -> FloatArray:
+def with_position_uncertainty(
+    problem: UpdateProblem, misplacements: tuple[PositionUncertainty, ...]
+) -> FloatArray | RootCovariance:
     """Add the effect of position errors to the covariance of the targets.
 
     Parameters
@@ -71,7 +74,7 @@ def with_position_uncertainty(problem: UpdateProblem, misplacements: tuple[Posit
 
     Returns
     -------
-    (2 n, 2 n) array
+    (2 n, 2 n) array, or RootCovariance
         Of the real and the imaginary part of each target in turn, (rad/s)^2.
     """
     if not misplacements:
@@ -80,7 +83,10 @@ def with_position_uncertainty(problem: UpdateProblem, misplacements: tuple[Posit
     for target in np.flatnonzero(problem.frf >= 0).tolist():
         changes[target] = _zero_changes(problem, target, misplacements)
     parts = np.stack([changes.real, changes.imag], axis=1).reshape(2 * len(changes), len(misplacements))
-    return np.asarray(problem.covariance + parts @ parts.T)
+    covariance = problem.covariance
+    if isinstance(covariance, RootCovariance):
+        return replace(covariance, common=np.hstack([covariance.common, parts]))
+    return np.asarray(covariance + parts @ parts.T)
 
 
 def _zero_changes(problem: UpdateProblem, target: int, misplacements: tuple[PositionUncertainty, ...]) -> ComplexArray:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.identification.root_covariance import RootCovariance
 from frf_ipz.updating.parameters import ParameterBasis
-from frf_ipz.updating.tracking import TargetRoots
+from frf_ipz.updating.tracking import TargetRoots, nearest_roots
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
@@ -31,7 +31,7 @@ class UpdateProblem:
         The measured FRFs.
     values, computed : (n,) complex array
         Measured and nominal poles and zeros, imaginary part >= 0, rad/s; poles first.
-    covariance : (2 n, 2 n) array
+    covariance : (2 n, 2 n) array, or RootCovariance
         Of the real and the imaginary part of each measured one in turn, (rad/s)^2.
     frf : (n,) int array
         Which FRF a zero belongs to; -1 for poles.
@@ -45,7 +45,7 @@ class UpdateProblem:
     labels: tuple[FrfLabel, ...]
     values: ComplexArray
     computed: ComplexArray
-    covariance: FloatArray
+    covariance: FloatArray | RootCovariance
     frf: IntArray
     names: tuple[str, ...]
     basis: ParameterBasis | None = None
@@ -87,14 +87,7 @@ class UpdateProblem:
             The model's, one to one, imaginary part > 0, rad/s.
         """
         targets = TargetRoots(frf=self.frf, rows={number: self.rows(number) for number in self.frfs})
-        values = np.zeros(len(reference), complex)
-        for number, roots in targets.damped(model.mass, model.damping, model.stiffness).items():
-            indices = np.flatnonzero(targets.frf == number)
-            upper = roots.values[roots.values.imag > 0]
-            distance = np.abs(reference[indices][:, None] - upper) / np.abs(reference[indices])[:, None]
-            rows, columns = linear_sum_assignment(distance)
-            values[indices[rows]] = upper[columns]
-        return values
+        return nearest_roots(targets, reference, model.mass, model.damping, model.stiffness)
 
 
 def make_problem(model: ReducedModel, fit: ModalFit, pairs: Pairs, basis: ParameterBasis | None) -> UpdateProblem:
@@ -124,11 +117,15 @@ def make_problem(model: ReducedModel, fit: ModalFit, pairs: Pairs, basis: Parame
         labels=fit.labels,
         values=np.array([pair.measured_value for pair in targets], complex),
         computed=np.array([pair.computed_value for pair in targets], complex),
-        covariance=fit.covariance[np.ix_(parts, parts)],
+        covariance=_selected(fit.covariance, parts),
         frf=np.array([pair.frf for pair in targets], int),
         names=tuple(_name(pair.kind, pair.frf, pair.measured_value, fit) for pair in targets),
         basis=basis,
     )
+
+
+def _selected(covariance: FloatArray | RootCovariance, parts: IntArray) -> FloatArray | RootCovariance:
+    return covariance.select(parts) if isinstance(covariance, RootCovariance) else covariance[np.ix_(parts, parts)]
 
 
 def _name(kind: str, frf: int, value: complex, fit: ModalFit) -> str:

@@ -1,4 +1,8 @@
-"""Tracking of poles and zeros while the model changes: by their vectors, not by their order."""
+"""Tracking of poles and zeros while the model changes: by their vectors, not by their order.
+
+The zeros of all FRFs are followed together, from where the first order puts them (`numerics.pole_forms`). Where one
+does not keep the greater part of its vectors, or two end at one root, all zeros of that FRF are computed and assigned.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NumericalError
 from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros, undamped_poles, undamped_zeros
+from frf_ipz.numerics.pole_forms import PoleForm, damped_form, undamped_form
+
+SAME_ROOT = 0.5  # overlap of its vectors with those before, above which no other root can be more alike
+APART = 1e-9  # relative distance below which two zeros of an FRF are one
+NEAR = 0.05  # of the logarithm of the modulus: a zero farther from the one that was named may be another
+UNMOVED = 1e-6  # relative distance of a zero that is the same but for rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,22 +37,6 @@ class TargetRoots:
     frf: IntArray
     rows: dict[int, tuple[FloatArray, FloatArray]]
 
-    def undamped(self, mass: FloatArray, stiffness: FloatArray) -> dict[int, Roots]:
-        """Compute all undamped roots.
-
-        Parameters
-        ----------
-        mass, stiffness : (r, r) array
-            The model.
-
-        Returns
-        -------
-        dict of int to Roots
-            Poles under -1, where any are targets, and the zeros of every FRF, squared.
-        """
-        poles = {-1: undamped_poles(mass, stiffness)} if (self.frf < 0).any() else {}
-        return poles | {number: undamped_zeros(mass, stiffness, *pair) for number, pair in self.rows.items()}
-
     def damped(self, mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> dict[int, Roots]:
         """Compute all damped roots.
 
@@ -59,6 +53,79 @@ class TargetRoots:
         poles = {-1: damped_poles(mass, damping, stiffness)} if (self.frf < 0).any() else {}
         return poles | {number: damped_zeros(mass, damping, stiffness, *pair) for number, pair in self.rows.items()}
 
+    @property
+    def poles(self) -> IntArray:
+        """Targets that are poles."""
+        return np.flatnonzero(self.frf < 0)
+
+    @property
+    def zeros(self) -> IntArray:
+        """Targets that are zeros."""
+        return np.flatnonzero(self.frf >= 0)
+
+    def outputs(self, targets: IntArray) -> FloatArray:
+        """Output row of each of some zeros.
+
+        Parameters
+        ----------
+        targets : (k,) int array
+            Which targets.
+
+        Returns
+        -------
+        (k, r) array
+            Motion of the sensor.
+        """
+        return np.array([self.rows[number][0] for number in self.frf[targets].tolist()])
+
+    def inputs(self, targets: IntArray) -> FloatArray:
+        """Input row of each of some zeros.
+
+        Parameters
+        ----------
+        targets : (k,) int array
+            Which targets.
+
+        Returns
+        -------
+        (k, r) array
+            Motion of the excited DOF.
+        """
+        return np.array([self.rows[number][1] for number in self.frf[targets].tolist()])
+
+    def near(self, form: PoleForm, start: ComplexArray, targets: IntArray) -> tuple[Roots, BoolArray]:
+        """Find zeros from near.
+
+        Parameters
+        ----------
+        form : PoleForm
+            The model.
+        start : (k,) complex array
+            Where to begin.
+        targets : (k,) int array
+            Which targets.
+
+        Returns
+        -------
+        roots : Roots
+            One a target.
+        found : (k,) bool array
+            False where there is none, or where two of an FRF are one.
+        """
+        outputs, inputs = self.outputs(targets), self.inputs(targets)
+        values, found = form.zeros(outputs, inputs, start)
+        values = np.where(found, values, start)
+        roots, exact = form.roots(outputs, inputs, values)
+        return roots, found & exact & self._apart(values, targets)
+
+    def _apart(self, values: ComplexArray, targets: IntArray) -> BoolArray:
+        order = np.lexsort((values.imag, values.real, self.frf[targets]))
+        same_frf = np.diff(self.frf[targets][order]) == 0
+        merged = same_frf & (np.abs(np.diff(values[order])) < APART * np.abs(values[order][1:]))
+        apart = np.ones(len(values), bool)
+        apart[order[1:][merged]] = apart[order[:-1][merged]] = False
+        return apart
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TrackedRoots:
@@ -67,7 +134,7 @@ class TrackedRoots:
     Parameters
     ----------
     groups : tuple of (IntArray, Roots)
-        Indices among the targets, and their roots: poles first, then the zeros of each FRF.
+        Indices among the targets, and their roots: poles first, then the zeros of all FRFs.
     """
 
     groups: tuple[tuple[IntArray, Roots], ...]
@@ -110,12 +177,24 @@ def nominal_roots(
     TrackedRoots
         One root a target.
     """
+
+    def distance(indices: IntArray, roots: Roots) -> FloatArray:
+        logs = np.log(np.abs(roots.values) + np.finfo(float).tiny)
+        return np.asarray(np.abs(np.log(np.abs(computed[indices]))[:, None] - 0.5 * logs))
+
+    poles, zeros = targets.poles, targets.zeros
     groups = []
-    for number, roots in targets.undamped(mass, stiffness).items():
-        indices = np.flatnonzero(targets.frf == number)
-        logs = np.log(np.abs(computed[indices]))
-        distance = np.abs(logs[:, None] - 0.5 * np.log(np.abs(roots.values) + np.finfo(float).tiny)[None])
-        groups.append((indices, roots.take(_assign(distance))))
+    if len(poles):
+        roots = undamped_poles(mass, stiffness)
+        groups.append((poles, roots.take(_assign(distance(poles, roots)))))
+    if len(zeros):
+        roots, found = targets.near(undamped_form(mass, stiffness), -(computed[zeros] ** 2), zeros)
+        logs = np.log(np.abs(computed[zeros]))
+        found &= np.abs(logs - 0.5 * np.log(np.abs(roots.values) + np.finfo(float).tiny)) < NEAR
+        for number, members in _lost(targets, zeros, found):
+            every = undamped_zeros(mass, stiffness, *targets.rows[number])
+            _put(roots, members, every.take(_assign(distance(zeros[members], every))))
+        groups.append((zeros, roots))
     return TrackedRoots(groups=tuple(groups))
 
 
@@ -137,10 +216,19 @@ def track(targets: TargetRoots, before: TrackedRoots, mass: FloatArray, stiffnes
         Those whose vectors overlap most with the ones before.
     """
     groups = []
-    all_roots = targets.undamped(mass, stiffness)
     for indices, old in before.groups:
-        new = all_roots[int(targets.frf[indices[0]])]
-        groups.append((indices, new.take(_assign(-_overlap(old, new, mass, new.slope)))))
+        if targets.frf[indices[0]] < 0:
+            new = undamped_poles(mass, stiffness)
+            groups.append((indices, new.take(_assign(-_overlap(old, new, mass, new.slope)))))
+            continue
+        force = stiffness @ old.right_vectors - (mass @ old.right_vectors) * old.values
+        start = old.values + np.sum(old.left_vectors * force, axis=0) / old.slope
+        new, found = targets.near(undamped_form(mass, stiffness), start, indices)
+        found &= _own_overlap(old, new, mass, new.slope) > SAME_ROOT
+        for number, members in _lost(targets, indices, found):
+            every = undamped_zeros(mass, stiffness, *targets.rows[number])
+            _put(new, members, every.take(_assign(-_overlap(old.take(members), every, mass, every.slope))))
+        groups.append((indices, new))
     return TrackedRoots(groups=tuple(groups))
 
 
@@ -163,13 +251,86 @@ def with_damping(
     TrackedRoots
         Of the upper half plane, rad/s.
     """
+
+    def upper_of(roots: Roots) -> Roots:
+        return roots.take(np.flatnonzero(roots.values.imag > 0))
+
     groups = []
-    all_roots = targets.damped(mass, damping, stiffness)
     for indices, old in undamped.groups:
-        new = all_roots[int(targets.frf[indices[0]])]
-        new = new.take(np.flatnonzero(new.values.imag > 0))
-        groups.append((indices, new.take(_assign(-_overlap(old, new, mass, new.slope / (2 * new.values))))))
+        if targets.frf[indices[0]] < 0:
+            new = upper_of(damped_poles(mass, damping, stiffness))
+            groups.append((indices, new.take(_assign(-_overlap(old, new, mass, new.slope / (2 * new.values))))))
+            continue
+        s = 1j * np.sqrt(old.values.astype(complex))
+        start = s - np.sum(old.left_vectors * (damping @ old.right_vectors), axis=0) / (2 * old.slope)
+        new, found = targets.near(damped_form(mass, damping, stiffness), start, indices)
+        found &= (new.values.imag > 0) & (_own_overlap(old, new, mass, new.slope / (2 * new.values)) > SAME_ROOT)
+        for number, members in _lost(targets, indices, found):
+            every = upper_of(damped_zeros(mass, damping, stiffness, *targets.rows[number]))
+            overlap = _overlap(old.take(members), every, mass, every.slope / (2 * every.values))
+            _put(new, members, every.take(_assign(-overlap)))
+        groups.append((indices, new))
     return TrackedRoots(groups=tuple(groups))
+
+
+def nearest_roots(
+    targets: TargetRoots, reference: ComplexArray, mass: FloatArray, damping: FloatArray, stiffness: FloatArray
+) -> ComplexArray:
+    """Find the damped roots nearest to given values.
+
+    Parameters
+    ----------
+    targets : TargetRoots
+        Poles and zeros that are targets.
+    reference : (n,) complex array
+        One value for each target, rad/s.
+    mass, damping, stiffness : (r, r) array
+        The model.
+
+    Returns
+    -------
+    (n,) complex array
+        The model's, one to one, imaginary part > 0, rad/s; 0 where it has too few.
+    """
+    values = np.zeros(len(reference), complex)
+
+    def assign(indices: IntArray, every: ComplexArray) -> None:
+        upper = every[every.imag > 0]
+        distance = np.abs(reference[indices][:, None] - upper) / np.abs(reference[indices])[:, None]
+        rows, columns = linear_sum_assignment(distance)
+        values[indices[rows]] = upper[columns]
+
+    poles, zeros = targets.poles, targets.zeros
+    if len(poles):
+        assign(poles, damped_poles(mass, damping, stiffness).values)
+    if len(zeros):
+        roots, found = targets.near(damped_form(mass, damping, stiffness), reference[zeros], zeros)
+        found &= np.abs(roots.values - reference[zeros]) < UNMOVED * np.abs(reference[zeros])
+        values[zeros] = np.where(found, roots.values, 0.0)
+        for number, members in _lost(targets, zeros, found):
+            values[zeros[members]] = 0.0
+            assign(zeros[members], damped_zeros(mass, damping, stiffness, *targets.rows[number]).values)
+    return values
+
+
+def _lost(targets: TargetRoots, zeros: IntArray, found: BoolArray) -> list[tuple[int, IntArray]]:
+    """FRFs with a zero that was not found, and where their zeros stand."""
+    frf = targets.frf[zeros]
+    return [(int(number), np.flatnonzero(frf == number)) for number in np.unique(frf[~found])]
+
+
+def _put(roots: Roots, members: IntArray, others: Roots) -> None:
+    roots.values[members] = others.values
+    roots.right_vectors[:, members] = others.right_vectors
+    roots.left_vectors[:, members] = others.left_vectors
+    roots.slope[members] = others.slope
+
+
+def _own_overlap(old: Roots, new: Roots, mass: FloatArray, norm: ComplexArray) -> FloatArray:
+    """Overlap of each root with itself; see `_overlap`."""
+    forward = np.sum(old.left_vectors * (mass @ new.right_vectors), axis=0)
+    backward = np.sum(new.left_vectors * (mass @ old.right_vectors), axis=0)
+    return np.asarray(np.abs(forward * backward) / np.abs(old.slope * norm))
 
 
 def _overlap(old: Roots, new: Roots, mass: FloatArray, norm: ComplexArray) -> FloatArray:

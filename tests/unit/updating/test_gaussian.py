@@ -7,12 +7,14 @@ from scipy.stats import multivariate_normal
 
 from frf_ipz.updating.gaussian import (
     draw_posterior,
+    linearise,
     most_contradicted,
     most_likely_scales,
-    slack_by_discrepancy,
     solve_step,
+    step_by_discrepancy,
 )
 from frf_ipz.updating.parameters import PriorTerm
+from frf_ipz.updating.target_noise import TargetNoise, noise_of
 
 DRAWS = 40_000
 SAMPLED = 0.03  # of the largest variance: four standard deviations of a sample covariance of that many draws
@@ -22,8 +24,26 @@ SAMPLED = 0.03  # of the largest variance: four standard deviations of a sample 
 def problem():
     rng = np.random.default_rng(0)
     sensitivity = rng.standard_normal((3, 5))
-    noise = np.diag([0.1, 0.2, 0.05])
-    return sensitivity, rng.standard_normal(3), noise
+    return sensitivity, rng.standard_normal(3), np.diag([0.1, 0.2, 0.05])
+
+
+@pytest.fixture
+def many():
+    """More data than parameters, in blocks, with errors that all of them share."""
+    rng = np.random.default_rng(7)
+    blocks = tuple(root @ root.T + 0.1 * np.eye(3) for root in rng.standard_normal((4, 3, 3)))
+    return (
+        rng.standard_normal((12, 5)),
+        rng.standard_normal(12),
+        TargetNoise(common=rng.standard_normal((12, 2)), blocks=blocks),
+    )
+
+
+def whole(noise):
+    matrix = noise.common @ noise.common.T
+    for part, block in noise.parts():
+        matrix[part, part] += block
+    return matrix
 
 
 def posterior(sensitivity, data, noise):
@@ -34,7 +54,7 @@ def posterior(sensitivity, data, noise):
 
 def test_the_step_is_the_posterior_mean(problem):
     sensitivity, data, noise = problem
-    step = solve_step(sensitivity, data, noise)
+    step = solve_step(linearise([sensitivity], data, noise_of(noise)), np.ones(1))
     mean, covariance = posterior(*problem)
     assert_allclose(step.mean, mean, rtol=1e-9)
     error = data - sensitivity @ mean
@@ -42,10 +62,39 @@ def test_the_step_is_the_posterior_mean(problem):
     assert_allclose(step.n_determined, np.trace(np.eye(5) - covariance), rtol=1e-9)
 
 
+def test_shared_errors_blocks_and_slack_are_those_of_the_whole_matrix(many):
+    sensitivity, data, noise = many
+    slack, factor = np.linspace(0.1, 2.0, len(data)), 0.7
+    matrix = whole(noise) + np.diag((factor * slack) ** 2)
+    linear = linearise([sensitivity[:, :2], sensitivity[:, 2:]], data, noise, slack)
+    step = solve_step(linear, np.ones(2), factor)
+    mean, covariance = posterior(sensitivity, data, matrix)
+    assert_allclose(step.mean, mean, rtol=1e-9)
+    error = data - sensitivity @ mean
+    assert_allclose(step.misfit, error @ np.linalg.solve(matrix, error), rtol=1e-9)
+    assert_allclose(linear.square(error, factor), step.misfit, rtol=1e-9)
+    assert_allclose(step.n_determined, np.trace(np.eye(5) - covariance), rtol=1e-9)
+    assert_allclose(np.concatenate([rows for _, rows in linear.sensitivity(np.ones(2))]), sensitivity, rtol=1e-9)
+
+
+def test_errors_are_drawn_with_the_cholesky_factor_of_the_whole_matrix(many):
+    noise = many[2]
+    white = np.random.default_rng(3).standard_normal((4, 12))
+    assert_allclose(noise.draw(white), white @ np.linalg.cholesky(whole(noise)).T, rtol=1e-9)
+
+
+def test_a_matrix_is_split_into_its_blocks(many):
+    noise = many[2]
+    blocks = noise_of(whole(TargetNoise(common=np.zeros((12, 0)), blocks=noise.blocks))).blocks
+    assert [len(block) for block in blocks] == [3, 3, 3, 3]
+    assert_allclose(np.array(blocks), np.array(noise.blocks))
+
+
 def test_draws_have_the_posterior_mean_and_covariance(problem):
     sensitivity, data, noise = problem
-    step = solve_step(sensitivity, data, noise)
-    members = draw_posterior(step, sensitivity, noise, np.random.default_rng(1), DRAWS)
+    linear, scales = linearise([sensitivity], data, noise_of(noise)), np.ones(1)
+    step = solve_step(linear, scales)
+    members = draw_posterior(step, linear, scales, noise_of(noise), np.random.default_rng(1), DRAWS, factor=0.0)
     mean, covariance = posterior(*problem)
     assert np.abs(members.mean(0) - mean).max() < SAMPLED
     assert np.abs(np.cov(members.T) - covariance).max() < SAMPLED * covariance.max()
@@ -63,7 +112,7 @@ def test_the_most_likely_scales_have_the_largest_evidence():
         believed = sum(0.5 * np.log(s / 0.5) ** 2 for s in scales)
         return multivariate_normal(np.zeros(12), total).logpdf(data) - believed
 
-    scales = most_likely_scales(parts, terms, data, noise, np.array([0.5, 0.5]))
+    scales = most_likely_scales(linearise(parts, data, noise_of(noise)), terms, np.array([0.5, 0.5]))
     best = evidence(scales)
     for factor in (0.9, 1.1):
         assert evidence(scales * [factor, 1.0]) < best
@@ -77,31 +126,61 @@ def test_a_fixed_scale_stays():
         PriorTerm(name="sure", root=np.eye(4), std=0.2, scale_uncertainty=0.0),
         PriorTerm(name="open", root=np.eye(1), std=0.2),
     ]
-    scales = most_likely_scales(parts, terms, 5.0 * np.ones(4), 1e-4 * np.eye(4), np.array([0.2, 0.2]))
+    linear = linearise(parts, 5.0 * np.ones(4), noise_of(1e-4 * np.eye(4)))
+    scales = most_likely_scales(linear, terms, np.array([0.2, 0.2]))
     assert scales[0] == 0.2
     assert scales[1] > 1.0
+
+
+def test_the_most_likely_slack_has_the_largest_evidence(many):
+    """Beside two scales, with errors in common and blocks: against the density of the whole covariance."""
+    sensitivity, data, noise = many
+    parts, slack = [sensitivity[:, :2], sensitivity[:, 2:]], np.linspace(0.1, 2.0, len(data))
+    stds = (0.5, 0.5, 1.0)
+    terms = [PriorTerm(name=str(k), root=np.eye(1), std=std) for k, std in enumerate(stds)]
+
+    def evidence(scales):
+        total = whole(noise) + np.diag((scales[2] * slack) ** 2)
+        total += sum(s**2 * part @ part.T for s, part in zip(scales, parts, strict=False))
+        believed = sum(0.5 * np.log(s / std) ** 2 for s, std in zip(scales, stds, strict=True))
+        return multivariate_normal(np.zeros(12), total).logpdf(4 * data) - believed
+
+    scales = most_likely_scales(linearise(parts, 4 * data, noise, slack), terms, np.array(stds))
+    best = evidence(scales)
+    for number in range(3):
+        for factor in (0.9, 1.1):
+            assert evidence(scales * np.where(np.arange(3) == number, factor, 1.0)) < best
 
 
 def test_slack_grows_until_the_misfit_is_that_of_noise():
     """The discrepancy principle: two data that no parameter tells apart disagree by a hundred deviations."""
     sensitivity, noise, slack = np.ones((2, 1)), 1e-4 * np.eye(2), np.full(2, 1e-3)
     data = np.array([1.0, 2.0])
-    factor = slack_by_discrepancy(sensitivity, data, noise, slack, 1.0)
-    met = solve_step(sensitivity, data, noise + np.diag((factor * slack) ** 2)).misfit
-    before = solve_step(sensitivity, data, noise + np.diag((factor / 3 * slack) ** 2)).misfit
-    assert met <= 2 < before
+    linear, scales = linearise([sensitivity], data, noise_of(noise), slack), np.ones(1)
+    step, factor = step_by_discrepancy(linear, scales, 1.0)
+    assert step.misfit <= 2 < solve_step(linear, scales, factor / 3).misfit
 
 
 def test_slack_stays_where_data_agree():
-    assert slack_by_discrepancy(np.eye(2), np.array([0.1, -0.2]), 0.01 * np.eye(2), np.full(2, 0.1), 0.7) == 0.7
+    linear = linearise([np.eye(2)], np.array([0.1, -0.2]), noise_of(0.01 * np.eye(2)), np.full(2, 0.1))
+    assert step_by_discrepancy(linear, np.ones(1), 0.7)[1] == 0.7
 
 
 def test_the_most_contradicted_datum_is_found():
     sensitivity, noise = np.ones((5, 1)), 1e-4 * np.eye(5)
     data = np.array([1.0, 1.01, 3.0, 0.99, 1.0])
-    assert most_contradicted(sensitivity, data, noise, 6.0) == 2
+    assert most_contradicted(linearise([sensitivity], data, noise_of(noise)), np.ones(1), 6.0) == 2
     data[2] = 1.0
-    assert most_contradicted(sensitivity, data, noise, 6.0) == -1
+    assert most_contradicted(linearise([sensitivity], data, noise_of(noise)), np.ones(1), 6.0) == -1
+
+
+def test_the_most_contradicted_datum_of_blocks_is_that_of_the_whole_matrix(many):
+    sensitivity, data, noise = many
+    inverse = np.linalg.inv(sensitivity @ sensitivity.T + whole(noise))
+    distance = np.abs(inverse @ data) / np.sqrt(np.diagonal(inverse))
+    linear, worst = linearise([sensitivity], data, noise), int(np.argmax(distance))
+    assert most_contradicted(linear, np.ones(1), 0.999 * distance[worst]) == worst
+    assert most_contradicted(linear, np.ones(1), 1.001 * distance[worst]) == -1
 
 
 @pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
@@ -110,5 +189,6 @@ def test_the_search_for_scales_stays_within_reason(size):
     rng = np.random.default_rng(4)
     parts = [1e-3 * rng.standard_normal((9, 2)), rng.standard_normal((9, 3)), 1e-5 * np.eye(9)]
     terms = [PriorTerm(name=str(k), root=np.eye(part.shape[1]), std=0.1) for k, part in enumerate(parts)]
-    scales = most_likely_scales(parts, terms, size * rng.standard_normal(9), 1e-16 * np.eye(9), np.full(3, 0.1))
+    linear = linearise(parts, size * rng.standard_normal(9), noise_of(1e-16 * np.eye(9)))
+    scales = most_likely_scales(linear, terms, np.full(3, 0.1))
     assert np.all(np.abs(np.log(scales / 0.1)) <= 6.0 + 1e-9)

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.numerics.low_rank import factorise
 from frf_ipz.updating.along_structure import part_table
 from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
 from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble
@@ -24,6 +25,7 @@ from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, frame_of, mo
 from frf_ipz.updating.minimal_change.outliers import contradicted_targets, unmet_targets
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase, log_moduli
 from frf_ipz.updating.parameters import ParameterBasis, generic_basis
+from frf_ipz.updating.target_noise import project
 from frf_ipz.updating.tracking import TargetRoots, TrackedRoots
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, nothing_to_do
 
@@ -62,9 +64,8 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     stated = _change_by_damping(problem.computed, start)
     phase = replace(phase, targets=phase.targets - stated)
     excluded = contradicted_targets(phase, start)
-    phase = replace(
-        phase, noise=phase.noise + np.diag(np.isin(np.arange(len(phase.target_roots.frf)), excluded) * EXCLUDED_STD**2)
-    )
+    is_excluded = np.isin(np.arange(len(phase.target_roots.frf)), excluded)
+    phase = replace(phase, noise=phase.noise.plus(np.where(is_excluded, EXCLUDED_STD**2, 0.0)))
     result = iterate(phase, start, max_iterations=options.max_iterations)
     progress(0.5, "damping")
     inner = modal_frame(*phase.matrices(result.theta))
@@ -72,8 +73,8 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     damped = iterate(damping, damping.initial_roots(), start=damping.start())
     history = [("stiffness", result), ("damping", damped)]
     shift = _change_by_damping(damped.tracked.values(len(stated)), result.tracked) - stated
-    if np.any(np.abs(shift) > SHIFTED * np.sqrt(np.diagonal(result.noise))):
-        phase = replace(phase, targets=phase.targets - shift, noise=phase.noise + np.diag((shift / 2) ** 2))
+    if np.any(np.abs(shift) > SHIFTED * np.sqrt(result.noise.variance)):
+        phase = replace(phase, targets=phase.targets - shift, noise=phase.noise.plus((shift / 2) ** 2))
         result = iterate(
             phase,
             result.tracked,
@@ -104,12 +105,15 @@ def _stiffness_phase(problem: UpdateProblem, frame: ModalFrame) -> StiffnessPhas
     size = np.abs(problem.values)
     # d ln|s| = (Re s d Re s + Im s d Im s) / |s|^2
     gradient = np.stack([problem.values.real, problem.values.imag], axis=1) / size[:, None] ** 2
+    modal_basis = modal_parameters(frame, basis)
     return StiffnessPhase(
         eigenvalues=frame.eigenvalues,
-        basis=modal_parameters(frame, basis),
+        basis=modal_basis,
+        by_stiffness=factorise(modal_basis.stiffness),
+        by_mass=factorise(modal_basis.mass),
         target_roots=TargetRoots(frf=problem.frf, rows=_modal_rows(problem, frame)),
         targets=np.log(size),
-        noise=_project_covariance(problem.covariance, gradient) + SMALLEST_NOISE**2 * np.eye(len(size)),
+        noise=project(problem.covariance, gradient).plus(np.full(len(size), SMALLEST_NOISE**2)),
         changes_mass=bool(np.any(basis.mass)),
     )
 
@@ -128,8 +132,8 @@ def _damping_phase(
         inner.to_modal(frame.to_modal(problem.model.damping) + _damping_by_stiffness(phase, result.theta)),
         _dashpots(problem, frame, inner),
         problem.values,
-        _project_covariance(problem.covariance, real_part),
-        np.exp(log_moduli(result.tracked, len(problem.values))),
+        project(problem.covariance, real_part),
+        1j * np.sqrt(result.tracked.values(len(problem.values))),
     )
 
 
@@ -148,13 +152,6 @@ def _damping_by_stiffness(phase: StiffnessPhase, theta: FloatArray) -> FloatArra
 def _modal_rows(problem: UpdateProblem, frame: ModalFrame) -> dict[int, tuple[FloatArray, FloatArray]]:
     pairs = {number: problem.rows(number) for number in problem.frfs}
     return {number: (output @ frame.shapes, force @ frame.shapes) for number, (output, force) in pairs.items()}
-
-
-def _project_covariance(covariance: FloatArray, gradient: FloatArray) -> FloatArray:
-    """Covariance of one number a target, each with a gradient by its real and imaginary part."""
-    count = len(gradient)
-    blocks = covariance.reshape(count, 2, count, 2)
-    return np.asarray(np.einsum("ia,iajb,jb->ij", gradient, blocks, gradient))
 
 
 def _updated(

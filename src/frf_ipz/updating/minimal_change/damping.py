@@ -15,9 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.numerics.low_rank import factorise
 from frf_ipz.rational import damping_ratio
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, unwhiten
+from frf_ipz.updating.target_noise import TargetNoise
 from frf_ipz.updating.tracking import TargetRoots, TrackedRoots, nominal_roots, with_damping
 
 COMMON_STD = 1.5  # of the logarithm of the factor common to all modes
@@ -31,6 +33,8 @@ SMALLEST_NOISE = 1e-4  # relative standard deviation of a real part: none is mea
 NO_DAMPING = 1e-3  # of the typical rate: a model with less states no damping for that mode
 POLE_SLACK = 1e-3  # relative standard deviation of a pole's real part that no damping matrix explains
 ZERO_SLACK = 0.02  # the same of a zero, which depends on mode shapes too, and these are not known better
+UNFELT = 0.05  # of a target's deviation: what all couplings together move it by that are left out
+TARGETS_AT_ONCE = 512
 INDEFINITE = 1e-9  # part of the largest rate below which a negative eigenvalue is rounding
 
 
@@ -60,7 +64,7 @@ class DampingPhase:
         Measured real parts with their sign changed, rad/s.
     sizes : (n,) array
         Sizes to which errors are relative, rad/s.
-    noise : (n, n) array
+    noise : TargetNoise
         Covariance of the targets over their sizes.
     pairs : pair of (r (r - 1) / 2,) int arrays
         Rows and columns of the couplings.
@@ -76,7 +80,7 @@ class DampingPhase:
     target_roots: TargetRoots
     targets: FloatArray
     sizes: FloatArray
-    noise: FloatArray
+    noise: TargetNoise
     pairs: tuple[IntArray, IntArray]
 
     @property
@@ -186,14 +190,15 @@ class DampingPhase:
         rates = self._mode_rates(theta)
         couplings = np.sqrt(rates[row] * rates[column])
         result = np.zeros((len(self.targets), len(theta)))
+        extra = factorise(self.extra)
         for indices, roots in tracked.groups:
             # by each entry of the damping matrix: -s y x^T / slope; every parameter is a sum over entries
-            weights = (roots.values / roots.slope)[:, None, None]
-            entries = (weights * roots.left_vectors.T[:, :, None] * roots.right_vectors.T[:, None, :]).real
-            by_mode = (entries * modal_damping).sum(axis=2) / 2 + (entries * modal_damping).sum(axis=1) / 2
-            by_coupling = (entries[:, row, column] + entries[:, column, row]) * couplings
-            by_extra = np.tensordot(entries, self.extra, ([1, 2], [1, 2]))
-            result[indices] = np.hstack([by_mode.sum(axis=1, keepdims=True), by_mode, by_coupling, by_extra])
+            x, y = roots.right_vectors, roots.left_vectors * (roots.values / roots.slope)
+            by_mode = (y * (modal_damping @ x) + x * (modal_damping @ y)).real.T / 2
+            result[indices, :1] = by_mode.sum(axis=1, keepdims=True)
+            result[indices, 1 : 1 + len(rates)] = by_mode
+            result[indices, 1 + len(rates) : 1 + len(rates) + len(row)] = _by_coupling(x, y, row, column) * couplings
+            result[indices, 1 + len(rates) + len(row) :] = extra.forms(y, x).real
         return result / self.sizes[:, None]
 
     def _mode_rates(self, theta: FloatArray) -> FloatArray:
@@ -233,6 +238,34 @@ class DampingPhase:
         return min(1.0, LARGEST_STEP / max(largest, np.finfo(float).tiny))
 
 
+def _by_coupling(x: ComplexArray, y: ComplexArray, row: IntArray, column: IntArray) -> FloatArray:
+    """Differentiate by symmetric pairs of entries of the damping matrix, (n, n_pairs)."""
+    result = (x.real[row] * y.real[column] + x.real[column] * y.real[row]).T
+    if np.any(x.imag) or np.any(y.imag):
+        result -= (x.imag[row] * y.imag[column] + x.imag[column] * y.imag[row]).T
+    return np.asarray(result)
+
+
+def _felt_couplings(phase: DampingPhase, tracked: TrackedRoots, *, std: float) -> tuple[IntArray, IntArray]:
+    """Couplings of modes that the targets feel: the prior of all others moves each by next to nothing of its noise."""
+    row, column = phase.pairs
+    couplings = np.sqrt(phase.rates[row] * phase.rates[column])
+    noise = np.sqrt(phase.noise.variance + phase.slack**2)
+    largest = np.zeros(len(row))
+    for indices, roots in tracked.groups:
+        for first in range(0, len(indices), TARGETS_AT_ONCE):
+            some = roots.take(np.arange(first, min(first + TARGETS_AT_ONCE, len(indices))))
+            x, y = some.right_vectors, some.left_vectors * (some.values / some.slope)
+            targets = indices[first : first + TARGETS_AT_ONCE]
+            moved = _by_coupling(x, y, row, column) / (phase.sizes * noise)[targets, None]
+            largest = np.maximum(largest, np.abs(moved).max(axis=0))
+    largest *= std * couplings
+    order = np.argsort(largest)
+    unfelt = order[np.cumsum(largest[order] ** 2) < UNFELT**2]
+    kept = np.setdiff1d(np.arange(len(row)), unfelt)
+    return row[kept], column[kept]
+
+
 def damping_phase(
     basis: ParameterBasis,
     inner: ModalFrame,
@@ -240,8 +273,8 @@ def damping_phase(
     matrix: FloatArray,
     dashpots: FloatArray,
     values: ComplexArray,
-    covariance: FloatArray,
-    moduli: FloatArray,
+    noise: TargetNoise,
+    undamped: ComplexArray,
 ) -> DampingPhase:
     """Set up the damping phase.
 
@@ -259,10 +292,10 @@ def damping_phase(
         The part of it that belongs to no mode; zero where there is none.
     values : (n,) complex array
         Measured poles and zeros, rad/s.
-    covariance : (n, n) array
-        Of their real parts, (rad/s)^2.
-    moduli : (n,) array
-        Moduli of the model's undamped roots that belong to the targets, rad/s.
+    noise : TargetNoise
+        Covariance of their real parts, (rad/s)^2.
+    undamped : (n,) complex array
+        The model's undamped roots that belong to the targets, rad/s.
 
     Returns
     -------
@@ -279,20 +312,25 @@ def damping_phase(
     np.fill_diagonal(shape, 1.0)
     extra, terms = _extra_parameters(basis, inner, dashpots)
     sizes = np.maximum(np.abs(values.real), SMALL_DAMPING * typical_ratio * np.abs(values))
-    return DampingPhase(
+    phase = DampingPhase(
         eigenvalues=inner.eigenvalues,
         rates=rates,
         shape=shape,
         dashpots=dashpots,
         extra=extra,
-        terms=_prior_terms(len(rates), len(extra), terms),
-        undamped=nominal_roots(target_roots, np.eye(len(rates)), np.diag(inner.eigenvalues), moduli.astype(complex)),
+        terms=(),
+        undamped=nominal_roots(target_roots, np.eye(len(rates)), np.diag(inner.eigenvalues), undamped),
         target_roots=target_roots,
         targets=-values.real,
         sizes=sizes,
         pairs=np.triu_indices(len(rates), 1),
-        noise=covariance / np.outer(sizes, sizes) + SMALLEST_NOISE**2 * np.eye(len(values)),
+        noise=noise.over(sizes).plus(np.full(len(values), SMALLEST_NOISE**2)),
     )
+    order = len(rates)
+    nominal_damping = shape * np.sqrt(rates[:, None] * rates) + dashpots
+    tracked = with_damping(target_roots, phase.undamped, np.eye(order), nominal_damping, np.diag(inner.eigenvalues))
+    pairs = _felt_couplings(phase, tracked, std=COUPLING_STD)
+    return replace(phase, pairs=pairs, terms=_prior_terms(order, len(pairs[0]), len(extra), terms))
 
 
 def _extra_parameters(
@@ -317,9 +355,8 @@ def _extra_parameters(
     return np.reshape(matrices, (len(matrices), *dashpots.shape)), tuple(terms)
 
 
-def _prior_terms(order: int, n_extra: int, extra: tuple[PriorTerm, ...]) -> tuple[PriorTerm, ...]:
+def _prior_terms(order: int, couplings: int, n_extra: int, extra: tuple[PriorTerm, ...]) -> tuple[PriorTerm, ...]:
     """Prior of all parameters, from that of the extra ones."""
-    couplings = order * (order - 1) // 2
     n_modal = 1 + order + couplings
     unit = np.eye(n_modal + n_extra)
     terms = [

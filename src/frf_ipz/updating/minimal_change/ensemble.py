@@ -79,15 +79,26 @@ def _draw_stiffness(
     posterior: Posterior, rng: np.random.Generator, count: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     phase, result = posterior.stiffness, posterior.stiffness_result
-    whitened = draw_posterior(result.step, result.sensitivity, result.noise, rng, count)
+    whitened = _draw(result, rng, count)
     theta = unwhiten(phase.terms, result.scales[:-1], whitened)
     mass, stiffness = phase.matrices(theta)
     # the poles predicted by the linear step are imposed: far from the mean, second-order terms would blur them
     poles = np.flatnonzero(phase.target_roots.frf < 0)
-    predicted = phase.targets - result.error + (whitened - result.step.mean) @ result.sensitivity.T
-    squares = np.exp(2 * predicted[:, poles])
+    sensitivity = np.concatenate(
+        [rows[phase.target_roots.frf[part] < 0] for part, rows in result.linear.sensitivity(result.scales[:-1])]
+    )
+    predicted = (phase.targets - result.error)[poles] + result.linear.combined(
+        whitened - result.step.mean
+    ) @ sensitivity.T
+    squares = np.exp(2 * predicted)
     shapes = next((roots.right_vectors.real for _, roots in result.tracked.groups if len(poles)), None)
     return theta, mass, stiffness if shapes is None else _with_poles(mass, stiffness, shapes, squares)
+
+
+def _draw(result: PhaseResult, rng: np.random.Generator, count: int) -> FloatArray:
+    """Whitened parameters, (count, k)."""
+    scales, factor = result.scales[:-1], float(result.scales[-1])
+    return draw_posterior(result.step, result.linear, scales, result.noise, rng, count, factor=factor)
 
 
 def _with_poles(mass: FloatArray, stiffness: FloatArray, shapes: FloatArray, squares: FloatArray) -> FloatArray:
@@ -105,7 +116,7 @@ def _with_poles(mass: FloatArray, stiffness: FloatArray, shapes: FloatArray, squ
 
 def _draw_damping(posterior: Posterior, rng: np.random.Generator, count: int) -> FloatArray:
     phase, result = posterior.damping, posterior.damping_result
-    whitened = draw_posterior(result.step, result.sensitivity, result.noise, rng, count)
+    whitened = _draw(result, rng, count)
     members = phase.damping(unwhiten(phase.terms, result.scales[:-1], whitened))
     values, vectors = np.linalg.eigh(members)
     members = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)

@@ -12,8 +12,9 @@ from typing import Protocol
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.updating.gaussian import GaussianStep, most_likely_scales, slack_by_discrepancy, solve_step
+from frf_ipz.updating.gaussian import GaussianStep, Linearised, linearise, most_likely_scales, step_by_discrepancy
 from frf_ipz.updating.parameters import PriorTerm, unwhiten
+from frf_ipz.updating.target_noise import TargetNoise
 from frf_ipz.updating.tracking import TrackedRoots
 
 MAX_ITERATIONS = 30
@@ -35,8 +36,8 @@ class Phase(Protocol):
         """Prior of the parameters."""
 
     @property
-    def noise(self) -> FloatArray:
-        """Covariance of the errors, (n, n)."""
+    def noise(self) -> TargetNoise:
+        """Covariance of the n errors."""
 
     @property
     def slack(self) -> FloatArray:
@@ -131,14 +132,14 @@ class PhaseResult:
         Roots of the model.
     error : (n,) array
         Targets minus model.
-    noise : (n, n) array
+    noise : TargetNoise
         Covariance of the targets and of what no parameter explains.
     scales : (t + 1,) array
         Standard deviations of the prior terms; last the factor on the slack.
     step : GaussianStep
         The last linear step.
-    sensitivity : (n, k) array
-        By whitened parameters, at the last step.
+    linear : Linearised
+        The data of the last step.
     rows : tuple of dict
         One an iteration, for the history.
     converged : bool
@@ -149,10 +150,10 @@ class PhaseResult:
     theta: FloatArray
     tracked: TrackedRoots
     error: FloatArray
-    noise: FloatArray
+    noise: TargetNoise
     scales: FloatArray
     step: GaussianStep
-    sensitivity: FloatArray
+    linear: Linearised
     rows: tuple[dict[str, float], ...]
     converged: bool
 
@@ -208,27 +209,23 @@ def iterate(
     nonlinearity, rows, converged = CURVATURE * state.error**2, [], False
     for iteration in range(1, (max_iterations or MAX_ITERATIONS) + 1):
         slopes = phase.slopes(state.theta, state.tracked)
-        parts = [slopes @ term.root for term in phase.terms]
+        parts = [term.by_whitened(slopes) for term in phase.terms]
         data = state.error + slopes @ state.theta
-        linearisation_noise = np.diag(nonlinearity**2)
+        linear = linearise(parts, data, phase.noise.plus(nonlinearity**2), phase.slack)
         if not scales_are_held and iteration <= SCALE_ITERATIONS:
-            new_scales = most_likely_scales(
-                [*parts, np.diag(phase.slack)], terms, data, phase.noise + linearisation_noise, scales
-            )
+            new_scales = most_likely_scales(linear, terms, scales)
             state = replace(state, whitened=_rescaled(phase.terms, scales / new_scales, state.whitened))
             scales = new_scales
-        sensitivity = np.hstack([scale * part for scale, part in zip(scales[:-1], parts, strict=True)])
-        scales[-1] = slack_by_discrepancy(sensitivity, data, phase.noise + linearisation_noise, phase.slack, scales[-1])
-        noise = phase.noise + np.diag((scales[-1] * phase.slack) ** 2)
-        step = solve_step(sensitivity, data, noise + linearisation_noise)
+        step, scales[-1] = step_by_discrepancy(linear, scales[:-1], float(scales[-1]))
+        noise = phase.noise.plus((scales[-1] * phase.slack) ** 2)
         before = state
-        state, fraction = _line_search(phase, scales[:-1], before, step.mean, noise + linearisation_noise)
-        predicted = before.error + fraction * (data - sensitivity @ step.mean - before.error)
+        state, fraction = _line_search(phase, scales, before, step.mean, linear)
+        predicted = before.error + fraction * (data - _explained(linear, scales[:-1], step.mean) - before.error)
         deviation = np.abs(state.error - predicted)
         if fraction:
             nonlinearity = CURVATURE * deviation
         else:
-            nonlinearity = STALLED * np.maximum(nonlinearity, np.sqrt(np.diagonal(noise)))
+            nonlinearity = STALLED * np.maximum(nonlinearity, np.sqrt(noise.variance))
         row = _history_row(terms, iteration, state.error, noise, step, scales, fraction)
         rows.append(row | phase.history_columns(state.theta))
         converged = fraction == 1 and _has_converged(noise, deviation, state.whitened - before.whitened)
@@ -243,10 +240,16 @@ def iterate(
         noise=noise,
         scales=scales,
         step=step,
-        sensitivity=sensitivity,
+        linear=linear,
         rows=tuple(rows),
         converged=converged,
     )
+
+
+def _explained(linear: Linearised, scales: FloatArray, mean: FloatArray) -> FloatArray:
+    """Give what the parameters make of the data."""
+    combined = linear.combined(mean)
+    return np.concatenate([rows @ combined for _, rows in linear.sensitivity(scales)])
 
 
 def _rescaled(terms: tuple[PriorTerm, ...], factors: FloatArray, whitened: FloatArray) -> FloatArray:
@@ -255,25 +258,24 @@ def _rescaled(terms: tuple[PriorTerm, ...], factors: FloatArray, whitened: Float
     return np.asarray(whitened * np.repeat(factors[: len(terms)], sizes))
 
 
-def _has_converged(noise: FloatArray, deviation: FloatArray, change: FloatArray) -> bool:
-    is_as_predicted = bool(np.all(deviation < CONVERGED_ERROR * np.sqrt(np.diagonal(noise))))
+def _has_converged(noise: TargetNoise, deviation: FloatArray, change: FloatArray) -> bool:
+    is_as_predicted = bool(np.all(deviation < CONVERGED_ERROR * np.sqrt(noise.variance)))
     return is_as_predicted or float(np.abs(change).max()) < CONVERGED_STEP
 
 
 def _line_search(
-    phase: Phase, scales: FloatArray, start: _Iterate, proposed: FloatArray, noise: FloatArray
+    phase: Phase, scales: FloatArray, start: _Iterate, proposed: FloatArray, linear: Linearised
 ) -> tuple[_Iterate, float]:
     """Take the largest fraction of the step that keeps the model valid and reduces misfit and change together."""
-    weights = np.linalg.inv(noise)
 
     def cost(whitened: FloatArray, error: FloatArray) -> float:
-        return float(whitened @ whitened + error @ weights @ error)
+        return float(whitened @ whitened) + linear.square(error, float(scales[-1]))
 
     initial_cost = cost(start.whitened, start.error)
-    fraction = phase.max_step_fraction(start.theta, unwhiten(phase.terms, scales, proposed))
+    fraction = phase.max_step_fraction(start.theta, unwhiten(phase.terms, scales[:-1], proposed))
     for _ in range(MAX_HALVINGS):
         whitened = start.whitened + fraction * (proposed - start.whitened)
-        theta = unwhiten(phase.terms, scales, whitened)
+        theta = unwhiten(phase.terms, scales[:-1], whitened)
         tracked = phase.roots(theta, start.tracked)
         if tracked is not None:
             error = phase.errors(tracked)
@@ -287,14 +289,14 @@ def _history_row(
     terms: tuple[PriorTerm, ...],
     iteration: int,
     error: FloatArray,
-    noise: FloatArray,
+    noise: TargetNoise,
     step: GaussianStep,
     scales: FloatArray,
     fraction: float,
 ) -> dict[str, float]:
     return {
         "iteration": iteration,
-        "misfit": float(error @ np.linalg.solve(noise, error)),
+        "misfit": linearise((), error, noise).square(error, 0.0),
         "step": fraction,
         "largest_error": float(np.abs(error).max(initial=0.0)),
         "size_of_change": float(np.linalg.norm(step.mean)),

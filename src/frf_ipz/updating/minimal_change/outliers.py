@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import IntArray
-from frf_ipz.updating.gaussian import most_contradicted, most_likely_scales
+from frf_ipz.updating.gaussian import linearise, most_contradicted, most_likely_scales
 
 if TYPE_CHECKING:
     from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult
@@ -42,18 +42,18 @@ def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots) -> IntArray
     theta = np.zeros(len(phase.basis.names))
     error = phase.errors(start)
     slopes = phase.slopes(theta, start)
-    parts = [slopes @ term.root for term in phase.terms]
-    noise = phase.noise + np.diag((CURVATURE * error**2) ** 2)
+    parts = [term.by_whitened(slopes) for term in phase.terms]
+    noise = phase.noise.plus((CURVATURE * error**2) ** 2)
     scales = np.array([term.std for term in phase.terms])
     outliers: list[int] = []
     while len(outliers) <= MAX_SHARE * len(error):
-        scales = most_likely_scales(parts, phase.terms, error, noise, scales)
-        sensitivity = np.hstack([scale * part for scale, part in zip(scales, parts, strict=True)])
-        worst = most_contradicted(sensitivity, error, noise, CONTRADICTED, least=MIN_ERROR)
+        linear = linearise(parts, error, noise)
+        scales = most_likely_scales(linear, phase.terms, scales)
+        worst = most_contradicted(linear, scales, CONTRADICTED, least=MIN_ERROR)
         if worst < 0:
             return np.array(outliers, int)
         outliers.append(worst)
-        noise[worst, worst] += EXCLUDED_STD**2
+        noise = noise.plus(EXCLUDED_STD**2 * (np.arange(len(error)) == worst))
     return np.array([], int)  # so many contradictions are no exception: the model is far off, and all targets count
 
 
@@ -74,8 +74,8 @@ def unmet_targets(result: PhaseResult, names: tuple[str, ...], excluded: IntArra
     tuple of str
         One sentence each.
     """
-    deviation = np.sqrt(np.diagonal(result.noise))
-    reach = np.linalg.norm(result.sensitivity, axis=1)
+    deviation = np.sqrt(result.noise.variance)
+    reach = np.concatenate([np.linalg.norm(rows, axis=1) for _, rows in result.linear.sensitivity(result.scales[:-1])])
     texts = []
     for target, name in enumerate(names):
         error = f"the {name} stays {abs(result.error[target]):.2g} of its value off"

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.numerics.pencils import undamped_sensitivity
+from frf_ipz.numerics.low_rank import LowRankMatrices
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
+from frf_ipz.updating.target_noise import TargetNoise
 from frf_ipz.updating.tracking import TargetRoots, TrackedRoots, nominal_roots, track
 
 POLE_SLACK = 1e-7  # relative standard deviation of a true pole that a reduced model cannot express: it has its modes
@@ -34,8 +35,10 @@ class StiffnessPhase:
         Poles and zeros that are targets.
     targets : (n,) array
         Logarithms of the moduli of measured poles and zeros, without the change by damping in the model.
-    noise : (n, n) array
+    noise : TargetNoise
         Their covariance.
+    by_stiffness, by_mass : LowRankMatrices
+        The matrices of the parameters.
     changes_mass : bool
         False where no parameter changes the mass: its derivatives are then not needed.
     """
@@ -44,7 +47,9 @@ class StiffnessPhase:
     basis: ParameterBasis
     target_roots: TargetRoots
     targets: FloatArray
-    noise: FloatArray
+    noise: TargetNoise
+    by_stiffness: LowRankMatrices
+    by_mass: LowRankMatrices
     changes_mass: bool
 
     @property
@@ -144,8 +149,10 @@ class StiffnessPhase:
         """
         result = np.zeros((len(self.targets), len(theta)))
         for indices, roots in tracked.groups:
-            slopes = undamped_sensitivity(roots, self.basis.stiffness, self.basis.mass if self.changes_mass else None)
-            result[indices] = 0.5 * (slopes / roots.values[:, None]).real
+            change = self.by_stiffness.forms(roots.left_vectors, roots.right_vectors)
+            if self.changes_mass:
+                change = change - roots.values[:, None] * self.by_mass.forms(roots.left_vectors, roots.right_vectors)
+            result[indices] = 0.5 * (change / (roots.slope * roots.values)[:, None]).real
         return result * self.basis.slopes(theta)
 
     def history_columns(self, theta: FloatArray) -> dict[str, float]:

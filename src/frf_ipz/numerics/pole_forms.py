@@ -1,0 +1,310 @@
+"""Zeros of many FRFs of one model from its poles: ``H(z) = sum of R_k / (z - p_k) + R / z^2``.
+
+One eigenvalue problem serves all FRFs. A zero that is known nearly follows from a few steps of Newton's method on that
+sum, and its vectors from the same fractions, where an eigenvalue problem of each FRF would cost the third power of the
+order. ``z`` is the s of a damped model, or the squared frequency of an undamped one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
+from frf_ipz.numerics.pencils import Roots, damped_zeros, undamped_poles
+
+Numbers: TypeAlias = ComplexArray | FloatArray
+STEPS = 30  # of Newton's method; from near, four are enough
+CONVERGED = 1e-12  # relative step from which a zero counts as found
+SMALL_RESIDUE = 1e-8  # relative residual of a motion that the poles express well
+ROWS_AT_ONCE = 2048
+RIGID = 1e-9  # of the largest squared frequency: below it a mode is a rigid-body mode
+REAL = 1e-6  # imaginary part over modulus below which a root is real: rounding of a double root
+CLOSE = 0.05  # of the modulus: a zero that damping moves farther than the first order says is followed in another way
+MERGED = 1e-7  # of the modulus, between two zeros: they are one, or hardly two
+SMALLEST_INVERSE = 1e-9  # of the largest: what is smaller is a zero at infinity
+SYMMETRIC = 1e-12  # of the largest entry: rounding
+UNDAMPED = 1e-9  # of the largest rate: below it damping leaves a mode alone
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PoleForm:
+    """A model as a sum over its poles.
+
+    Parameters
+    ----------
+    poles : (m,) array
+        Simple poles; real, as shapes and slopes are, where there is no damping.
+    shapes : (r, m) array
+        Right vectors, which are the left ones too: the matrices are symmetric.
+    slope : (m,) array
+        ``x^T P'(p) x``.
+    rigid : (r, k) array
+        Mass-normalised rigid-body modes that are double poles at 0.
+    mass, damping, stiffness : (r, r) array
+        The model; no damping where ``z`` is a squared frequency.
+    """
+
+    poles: Numbers
+    shapes: Numbers
+    slope: Numbers
+    rigid: FloatArray
+    mass: FloatArray
+    damping: FloatArray | None
+    stiffness: FloatArray
+
+    def zeros(self, outputs: FloatArray, inputs: FloatArray, start: ComplexArray) -> tuple[ComplexArray, BoolArray]:
+        """Find a zero of each FRF from near.
+
+        Parameters
+        ----------
+        outputs, inputs : (n, r) array
+            Rows of sensor and excitation.
+        start : (n,) complex array
+            Where to begin.
+
+        Returns
+        -------
+        values : (n,) complex array
+            Zeros.
+        found : (n,) bool array
+            False where Newton's method did not end.
+        """
+        values, found = start.astype(complex), np.zeros(len(start), bool)
+        for first in range(0, len(start), ROWS_AT_ONCE):
+            part = slice(first, first + ROWS_AT_ONCE)
+            residues, double = self._residues(outputs[part], inputs[part])
+            values[part], found[part] = _newton(residues, double, self.poles, start[part])
+        is_real = np.abs(values.imag) <= CONVERGED * np.abs(values)
+        return np.asarray(np.where(is_real, values.real, values)), found
+
+    def roots(self, outputs: FloatArray, inputs: FloatArray, zeros: ComplexArray) -> tuple[Roots, BoolArray]:
+        """Give the vectors of zeros.
+
+        Parameters
+        ----------
+        outputs, inputs : (n, r) array
+            Rows of sensor and excitation.
+        zeros : (n,) complex array
+            Zeros.
+
+        Returns
+        -------
+        roots : Roots
+            With vectors and slopes.
+        exact : (n,) bool array
+            False where the poles do not express the motion: they are nearly defective.
+        """
+        order = len(self.mass)
+        right, left = np.zeros((order, len(zeros)), complex), np.zeros((order, len(zeros)), complex)
+        slope, exact = np.zeros(len(zeros), complex), np.zeros(len(zeros), bool)
+        for first in range(0, len(zeros), ROWS_AT_ONCE):
+            part = slice(first, first + ROWS_AT_ONCE)
+            z = zeros[part]
+            residues, double = self._residues(outputs[part], inputs[part])
+            with np.errstate(divide="ignore", invalid="ignore"):  # a zero on a pole is not exact
+                x, y = self._motion(inputs[part], z), self._motion(outputs[part], z)
+                slope[part] = np.sum(residues / (z[:, None] - self.poles) ** 2, axis=1) + 2 * double / z**3
+                exact[part] = self._is_exact(x, inputs[part], z) & self._is_exact(y, outputs[part], z)
+            right[:, part], left[:, part] = x, y
+        return Roots(values=zeros, right_vectors=right, left_vectors=left, slope=slope), exact
+
+    def _residues(self, outputs: FloatArray, inputs: FloatArray) -> tuple[Numbers, FloatArray]:
+        residues = (outputs @ self.shapes) * (inputs @ self.shapes) / self.slope
+        return residues, np.sum((outputs @ self.rigid) * (inputs @ self.rigid), axis=1)
+
+    def _motion(self, loads: FloatArray, z: ComplexArray) -> ComplexArray:
+        """Motion under unit loads, (r, n)."""
+        by_pole = (loads @ self.shapes) / self.slope / (z[:, None] - self.poles)
+        motion = self.shapes @ by_pole.T
+        return np.asarray(
+            motion + self.rigid @ ((loads @ self.rigid) / z[:, None] ** 2).T if self.rigid.size else motion
+        )
+
+    def _is_exact(self, motion: ComplexArray, loads: FloatArray, z: ComplexArray) -> BoolArray:
+        if self.damping is None:
+            force = z * (self.mass @ motion) - self.stiffness @ motion
+        else:
+            force = z**2 * (self.mass @ motion) + z * (self.damping @ motion) + self.stiffness @ motion
+        size = np.linalg.norm(self.stiffness @ motion, axis=0) + np.linalg.norm(loads, axis=1)
+        return np.asarray(np.linalg.norm(force - loads.T, axis=0) < SMALL_RESIDUE * size)
+
+
+def undamped_form(mass: FloatArray, stiffness: FloatArray) -> PoleForm:
+    """Express an undamped model by its poles.
+
+    Parameters
+    ----------
+    mass, stiffness : (r, r) array
+        Symmetric; the mass positive definite.
+
+    Returns
+    -------
+    PoleForm
+        Of squared frequencies.
+    """
+    poles = undamped_poles(mass, stiffness)
+    return PoleForm(
+        poles=poles.values.real,
+        shapes=poles.right_vectors.real,
+        slope=np.ones(len(poles.values)),
+        rigid=np.zeros((len(mass), 0)),
+        mass=mass,
+        damping=None,
+        stiffness=stiffness,
+    )
+
+
+def damped_form(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> PoleForm:
+    """Express a damped model by its poles.
+
+    Parameters
+    ----------
+    mass, damping, stiffness : (r, r) array
+        Symmetric; the mass positive definite.
+
+    Returns
+    -------
+    PoleForm
+        Of s in rad/s.
+    """
+    modes = undamped_poles(mass, stiffness)
+    shapes, squares = modes.right_vectors.real, modes.values.real
+    rates = shapes.T @ damping @ shapes
+    top = max(float(np.abs(squares).max(initial=0.0)), np.finfo(float).tiny)
+    free = (np.abs(squares) <= RIGID * top) & (np.abs(rates).max(axis=1) <= UNDAMPED * np.abs(rates).max())
+    elastic, rates = np.flatnonzero(~free), rates[np.ix_(~free, ~free)]
+    count = len(elastic)
+    scale = np.sqrt(top)
+    state = np.zeros((2 * count, 2 * count))
+    state[:count, count:] = np.eye(count)
+    state[count:, :count] = np.diag(-squares[elastic] / top)
+    state[count:, count:] = -rates / scale
+    values, vectors = np.linalg.eig(state)
+    values, vectors = values * scale, vectors[:count]
+    slope = 2 * values * np.sum(vectors**2, axis=0) + np.einsum("ik,ij,jk->k", vectors, rates, vectors)
+    return PoleForm(
+        poles=values.astype(complex),
+        shapes=shapes[:, elastic] @ vectors.astype(complex),
+        slope=slope.astype(complex),
+        rigid=shapes[:, free],
+        mass=mass,
+        damping=damping,
+        stiffness=stiffness,
+    )
+
+
+def _newton(
+    residues: Numbers, double: FloatArray, poles: Numbers, start: ComplexArray
+) -> tuple[ComplexArray, BoolArray]:
+    """Newton's method on the sum times the distance to the nearest pole, which may lie next to the zero."""
+    is_real = not np.iscomplexobj(residues) and bool(np.all(start.imag == 0))
+    values = start.real.copy() if is_real else start.astype(complex)
+    found = np.zeros(len(values), bool)
+    for _ in range(STEPS):
+        open_ones = np.flatnonzero(~found)
+        if not len(open_ones):
+            break
+        z, numerators, rigid = values[open_ones], residues[open_ones], double[open_ones]
+        distance = z[:, None] - poles
+        nearest = np.argmin(np.abs(distance), axis=1)[:, None]
+        gap = np.take_along_axis(distance, nearest, axis=1)[:, 0]
+        own = np.take_along_axis(numerators, nearest, axis=1)[:, 0]
+        np.put_along_axis(distance, nearest, 1.0, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # where it leads nowhere, nothing is found
+            terms = numerators / distance
+            np.put_along_axis(terms, nearest, 0.0, axis=1)
+            rest = terms.sum(axis=1) + rigid / z**2
+            slope = -np.sum(terms / distance, axis=1) - 2 * rigid / z**3
+            step = (own + gap * rest) / (rest + gap * slope)
+        is_finite = np.isfinite(step)
+        values[open_ones] = z - np.where(is_finite, step, 0.0)
+        found[open_ones] = is_finite & (np.abs(step) <= CONVERGED * np.abs(z))
+        if not is_finite.any():
+            break
+    return np.asarray(values), found
+
+
+def every_damped_zero(
+    mass: FloatArray, damping: FloatArray, stiffness: FloatArray, outputs: FloatArray, inputs: FloatArray
+) -> list[Roots]:
+    """All zeros of several FRFs of a lightly damped model.
+
+    Zeros without damping are eigenvalues of a diagonal matrix with one of rank 1; damping moves each a little. Where it
+    moves them so far that not each is found again, the quadratic eigenvalue problem of that FRF is solved.
+
+    Parameters
+    ----------
+    mass, damping, stiffness : (r, r) array
+        They need not be symmetric, but that costs an eigenvalue problem an FRF.
+    outputs, inputs : (n_frfs, r) array
+        Rows of sensors and excitations.
+
+    Returns
+    -------
+    list of Roots
+        Of each FRF those with an imaginary part of at least 0, rad/s.
+    """
+    forms = None
+    if all(
+        np.abs(matrix - matrix.T).max() <= SYMMETRIC * np.abs(matrix).max() for matrix in (mass, damping, stiffness)
+    ):
+        forms = undamped_form(mass, stiffness), damped_form(mass, damping, stiffness)
+    found: list[Roots] = []
+    for output, force in zip(outputs, inputs, strict=True):
+        roots = None if forms is None else _damped_from_undamped(*forms, output, force)
+        if roots is None:
+            every = damped_zeros(mass, damping, stiffness, output, force)
+            roots = every.take(np.flatnonzero(every.values.imag >= -REAL * np.abs(every.values)))
+        found.append(roots)
+    return found
+
+
+def _damped_from_undamped(undamped: PoleForm, damped: PoleForm, output: FloatArray, force: FloatArray) -> Roots | None:
+    squares = _undamped_zeros(undamped, output, force)
+    if squares is None:
+        return None
+    outputs, inputs = np.tile(output, (len(squares), 1)), np.tile(force, (len(squares), 1))
+    squares, is_found = undamped.zeros(outputs, inputs, squares)
+    if not is_found.all() or _merge(squares):
+        return None
+    roots, exact = undamped.roots(outputs, inputs, squares)
+    if not exact.all() or damped.damping is None:
+        return None
+    shift = np.sum(roots.left_vectors * (damped.damping @ roots.right_vectors), axis=0) / (2 * roots.slope)
+    s = 1j * np.sqrt(squares.astype(complex))
+    s = np.where(s.imag < 0, -s, s)
+    is_real = np.abs(s.imag) <= REAL * np.abs(s)
+    start = np.concatenate([s, -s[is_real]]) - np.concatenate([shift, shift[is_real]])
+    outputs, inputs = np.tile(output, (len(start), 1)), np.tile(force, (len(start), 1))
+    values, is_found = damped.zeros(outputs, inputs, start)
+    moved = np.abs(values - start) > CLOSE * np.abs(start)
+    if not is_found.all() or moved.any() or _merge(values) or (values.imag < -REAL * np.abs(values)).any():
+        return None
+    roots, exact = damped.roots(outputs, inputs, values)
+    return roots if exact.all() else None
+
+
+def _undamped_zeros(form: PoleForm, output: FloatArray, force: FloatArray) -> ComplexArray | None:
+    """Eigenvalues that are one over the distance of each zero from a shift below all poles."""
+    residues = (output @ form.shapes) * (force @ form.shapes)
+    top = float(np.abs(form.poles).max(initial=0.0))
+    if not top or not np.any(residues):
+        return None
+    shift = -top / np.sqrt(len(residues))
+    inverse = 1 / (form.poles - shift)
+    size = np.sqrt(np.abs(residues))
+    response = float(residues @ inverse)
+    if abs(response) < SMALL_RESIDUE * float(np.abs(residues) @ inverse):
+        return None
+    matrix = np.diag(inverse) - np.outer(inverse * size, np.sign(residues) * size * inverse) / response
+    values = np.linalg.eigvals(matrix)
+    finite = np.abs(values) > SMALLEST_INVERSE * np.abs(values).max()
+    return np.asarray(shift + 1 / values[finite], complex)
+
+
+def _merge(values: ComplexArray) -> bool:
+    distance = np.abs(values[:, None] - values) + np.where(np.eye(len(values), dtype=bool), np.inf, 0.0)
+    return bool(np.any(distance.min(axis=1, initial=np.inf) < MERGED * np.abs(values)))

@@ -1,0 +1,36 @@
+"""Bilinear forms of matrices of low rank, against the matrices."""
+
+import numpy as np
+import pytest
+
+from frf_ipz.numerics.low_rank import factorise
+
+ORDER = 9
+
+
+@pytest.fixture
+def symmetric():
+    rng = np.random.default_rng(0)
+    roots = [rng.standard_normal((ORDER, rank)) for rank in (1, 2, 5, ORDER)]
+    pair = np.zeros((ORDER, ORDER))
+    pair[1, 4] = pair[4, 1] = 3.0
+    return np.array([np.zeros((ORDER, ORDER)), *(root @ root.T for root in roots), pair])
+
+
+@pytest.mark.parametrize("imaginary", [0.0, 1.0])
+def test_forms_are_those_of_the_matrices(symmetric, imaginary):
+    rng = np.random.default_rng(1)
+    left, right = (
+        rng.standard_normal((ORDER, 20)) + 1j * imaginary * rng.standard_normal((ORDER, 20)) for _ in range(2)
+    )
+    expected = np.einsum("in,pij,jn->np", left, symmetric, right)
+    assert np.abs(factorise(symmetric).forms(left, right) - expected).max() < 1e-9 * np.abs(expected).max()
+
+
+def test_a_pair_of_modes_needs_two_vectors(symmetric):
+    assert factorise(symmetric[-1:]).vectors.shape == (ORDER, 2)
+
+
+def test_no_matrices_have_no_forms():
+    assert factorise(np.zeros((2, 3, 3))).forms(np.eye(3), np.eye(3)).tolist() == [[0.0, 0.0]] * 3
+    assert factorise(np.zeros((0, 3, 3))).forms(np.eye(3), np.eye(3)).shape == (3, 0)

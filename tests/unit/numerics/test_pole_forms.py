@@ -1,0 +1,71 @@
+"""Zeros from the poles of a model, against the eigenvalue problem of each FRF."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from frf_ipz.numerics.pencils import damped_zeros, undamped_zeros
+from frf_ipz.numerics.pole_forms import damped_form, every_damped_zero, undamped_form
+
+ORDER = 12
+FROM = 1e-4  # relative distance of the start from a zero
+
+
+def matrices(seed=0, *, rigid=False, dashpot=0.0):
+    rng = np.random.default_rng(seed)
+    root = rng.standard_normal((ORDER, ORDER))
+    mass = root @ root.T / ORDER + np.eye(ORDER)
+    springs = rng.standard_normal((ORDER - 1 if rigid else ORDER + 3, ORDER))
+    if rigid:
+        springs -= springs.mean(axis=1, keepdims=True)  # a motion of all DOFs alike strains none
+    stiffness = 1e5 * springs.T @ springs
+    damper = rng.standard_normal(ORDER)
+    return mass, 2e-6 * stiffness + dashpot * np.outer(damper, damper), stiffness
+
+
+@pytest.fixture
+def rows():
+    return np.random.default_rng(9).standard_normal((2, ORDER))
+
+
+def upper_of(values):
+    return np.sort_complex(values[values.imag > 0])
+
+
+def forms(damped, model):
+    mass, damping, stiffness = model
+    return damped_form(mass, damping, stiffness) if damped else undamped_form(mass, stiffness)
+
+
+@pytest.mark.parametrize("rigid", [False, True])
+@pytest.mark.parametrize("damped", [False, True])
+def test_zeros_with_their_vectors_are_those_of_the_pencil(rows, damped, rigid):
+    model = matrices(rigid=rigid)
+    pencil = damped_zeros(*model, *rows) if damped else undamped_zeros(model[0], model[2], *rows)
+    form = forms(damped, model)
+    outputs, inputs = (np.tile(row, (len(pencil.values), 1)) for row in rows)
+    values, found = form.zeros(outputs, inputs, pencil.values * (1 + FROM))
+    roots, exact = form.roots(outputs, inputs, values)
+    assert found.all()
+    assert exact.all()
+    assert_allclose(values, pencil.values, rtol=1e-8)
+    moved = roots.left_vectors * roots.right_vectors / roots.slope  # whatever the vectors are normalised to
+    expected = pencil.left_vectors * pencil.right_vectors / pencil.slope
+    assert np.abs(moved - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("dashpot", [0.0, 3.0, 300.0, 3e4])
+@pytest.mark.parametrize("rigid", [False, True])
+def test_every_zero_is_found(rows, rigid, dashpot):
+    model = matrices(3, rigid=rigid, dashpot=dashpot)
+    for output, force in (rows, (rows[0], rows[0]), np.eye(ORDER)[[0, 5]]):
+        (found,) = every_damped_zero(*model, output[None], force[None])
+        expected = upper_of(damped_zeros(*model, output, force).values)
+        assert_allclose(upper_of(found.values), expected, rtol=1e-7)
+
+
+def test_matrices_that_are_not_symmetric_are_taken_too(rows):
+    mass, damping, stiffness = matrices(4)
+    stiffness = stiffness + 1e-2 * np.triu(stiffness, 1)
+    (found,) = every_damped_zero(mass, damping, stiffness, rows[:1], rows[1:])
+    assert_allclose(upper_of(found.values), upper_of(damped_zeros(mass, damping, stiffness, *rows).values), rtol=1e-9)
