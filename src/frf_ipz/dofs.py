@@ -50,7 +50,7 @@ class Dof:
     @property
     def unsigned(self) -> Dof:
         """The same DOF in the positive direction, as a model has it."""
-        return replace(self, sign=1)
+        return self if self.sign == 1 else replace(self, sign=1)
 
     @property
     def name(self) -> str:

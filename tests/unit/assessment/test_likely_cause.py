@@ -8,7 +8,9 @@ import pytest
 import frf_ipz
 from clamped_beam import BEAM
 from frf_ipz.assessment.assess import likely_cause
-from frf_ipz.assessment.causes.cause import Situation
+from frf_ipz.assessment.causes import places
+from frf_ipz.assessment.causes.cause import Situation, log_evidence
+from frf_ipz.assessment.causes.cost_bounds import bound_costs
 from frf_ipz.assessment.causes.likely_cause import find_likely_cause
 from frf_ipz.assessment.causes.modal_comparison import computed_modes, measured_modes
 
@@ -219,3 +221,17 @@ def test_a_gain_that_no_unit_explains_is_no_cause(fit):
 def test_a_wrong_end_is_named():
     pinned = frf_ipz.fit_modes(measure(left="free"))
     assert "[beam] left" in cause_of(pinned).line_or_key
+
+
+@pytest.mark.parametrize("length_m", [BEAM["length_m"], 1.05 * BEAM["length_m"]])
+def test_what_a_moved_sensor_is_worth_at_most_is_never_less_than_what_it_is_worth(fit, length_m):
+    beam = frf_ipz.make_beam(**{**BEAM, "length_m": length_m})
+    modes = computed_modes(frf_ipz.solve_modes(beam, n_modes=24))
+    situation = Situation(
+        measured=measured_modes(fit), computed=modes, model=beam, test_file="test.toml", model_file="model.toml"
+    )
+    causes = [*places.misplaced_sensor(situation), *places.exchanged_sensors(situation)]
+    largest = bound_costs(situation).largest_logs(causes)
+    exact = np.array([log_evidence(cause, situation) for cause in causes])
+    assert np.isfinite(largest).all()
+    assert np.all(largest >= exact - 1e-9 * np.abs(exact))

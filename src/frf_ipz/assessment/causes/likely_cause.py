@@ -14,9 +14,11 @@ from scipy.special import logsumexp
 from frf_ipz.assessment.assessment import LikelyCause
 from frf_ipz.assessment.causes import gains, materials, places, supports
 from frf_ipz.assessment.causes.cause import NO_MISTAKE, Cause, Situation, explains, log_evidence
+from frf_ipz.assessment.causes.cost_bounds import bound_costs
 from frf_ipz.assessment.causes.modal_comparison import unrelated_log_likelihood
 
 if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
     from frf_ipz.assessment.causes.cause import FindCauses
 
 KINDS: tuple[FindCauses, ...] = (
@@ -35,6 +37,7 @@ KINDS: tuple[FindCauses, ...] = (
     supports.other_supports,
 )
 MORE_LIKELY_THAN_NOT = 0.5
+NEGLIGIBLE = 40.0  # of a log evidence, below the best: a million causes so unlikely add nothing to a probability
 
 
 def find_likely_cause(situation: Situation) -> LikelyCause | None:
@@ -55,13 +58,25 @@ def find_likely_cause(situation: Situation) -> LikelyCause | None:
     causes = [cause for kind in KINDS for cause in kind(situation)]
     nothing = log_evidence(NO_MISTAKE, situation)
     something_else = unrelated_log_likelihood(situation.measured)
-    logs = np.array([nothing, something_else, *(log_evidence(cause, situation) for cause in causes)])
+    logs = np.array([nothing, something_else, *_log_evidences(causes, situation, max(nothing, something_else))])
     probability = np.exp(logs - logsumexp(logs))
     if probability[2:].sum() <= MORE_LIKELY_THAN_NOT:
         return None
     if not explains(causes[int(np.argmax(probability[2:]))], situation):
         return None
     return _worded(causes, probability[2:])
+
+
+def _log_evidences(causes: list[Cause], situation: Situation, best: float) -> FloatArray:
+    """Log evidence of each cause; minus infinity for one that cannot matter beside the best."""
+    largest = bound_costs(situation).largest_logs(causes)
+    logs = np.full(len(causes), -np.inf)
+    for number in np.argsort(-largest, kind="stable").tolist():
+        if largest[number] < best - NEGLIGIBLE:
+            break
+        logs[number] = log_evidence(causes[number], situation)
+        best = max(best, float(logs[number]))
+    return logs
 
 
 def agrees(situation: Situation) -> bool:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.identification.results.shapes import product_factors
 from frf_ipz.rational import natural_frequency_hz
 
@@ -189,10 +189,10 @@ def log_likelihood(measured: MeasuredModes, frequency_hz: FloatArray, products: 
         Natural logarithm; 0 where all agrees.
     """
     costs = _costs(measured, frequency_hz, products)
-    not_computed = _costs_of_absence(measured, measured.products)
+    not_computed = costs_of_absence(measured, measured.products)
     rows, columns = _assign(costs, not_computed)
     inside = (frequency_hz > measured.band_hz[0]) & (frequency_hz < measured.band_hz[1])
-    not_measured = inside * _costs_of_absence(measured, products)
+    not_measured = inside * costs_of_absence(measured, products)
     alone = np.delete(not_computed, rows).sum() + np.delete(not_measured, columns).sum()
     return float(-costs[rows, columns].sum() - alone)
 
@@ -206,22 +206,78 @@ def _assign(costs: FloatArray, alone: FloatArray) -> tuple[IntArray, IntArray]:
 
 def _costs(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray) -> FloatArray:
     """Costs of assigning each measured mode (rows) to each computed one (columns); infinite to one that is far."""
-    ratios = np.log(measured.frequency_hz[:, None] / frequency_hz)
-    first, second = measured.products[:, None, :], products[None]
-    sizes = np.sqrt((np.abs(first) ** 2 + np.abs(second) ** 2) / 2)
-    floor = np.sqrt(np.mean(np.abs(measured.products) ** 2, axis=1))[:, None, None]
-    noise = measured.deviations[:, None, :]
-    scales = np.sqrt((SHAPE_SCALE * np.hypot(sizes, SHAPE_SCALE * floor)) ** 2 + noise**2)
-    errors = np.abs(first - second) / np.maximum(scales, np.finfo(float).tiny)
-    costs = np.log1p((ratios / FREQUENCY_SCALE) ** 2) + np.log1p(errors**2).sum(axis=2)
-    return np.where(np.abs(ratios) > FAR * FREQUENCY_SCALE, np.inf, costs)
+    near, costs = cost_of_frequency(measured.frequency_hz, frequency_hz)
+    rows, columns = np.nonzero(near)
+    floor = np.sqrt(np.mean(np.abs(measured.products) ** 2, axis=1))[rows, None]
+    of_products = cost_of_products(measured.products[rows], products[columns], measured.deviations[rows], floor)
+    result = np.full(costs.shape, np.inf)
+    result[rows, columns] = costs[rows, columns] + of_products.sum(axis=1)
+    return result
 
 
-def _costs_of_absence(measured: MeasuredModes, products: ComplexArray) -> FloatArray:
-    """Costs of modes without a counterpart, measured ones or computed ones: little for one that hardly shows.
+def cost_of_frequency(measured_hz: FloatArray, computed_hz: FloatArray) -> tuple[BoolArray, FloatArray]:
+    """Give the cost of each pair of natural frequencies.
+
+    Parameters
+    ----------
+    measured_hz : (n,) array
+        Hz.
+    computed_hz : (m,) array
+        Hz.
+
+    Returns
+    -------
+    near : (n, m) bool array
+        False where a pair is out of the question.
+    costs : (n, m) array
+        Minus the logarithm of Cauchy's density, over that of its middle.
+    """
+    ratios = np.log(measured_hz[:, None] / computed_hz)
+    return np.abs(ratios) <= FAR * FREQUENCY_SCALE, np.log1p((ratios / FREQUENCY_SCALE) ** 2)
+
+
+def cost_of_products(
+    measured: ComplexArray, computed: ComplexArray | FloatArray, deviations: FloatArray, floor: FloatArray
+) -> FloatArray:
+    """Give the cost of pairs of products of shapes.
+
+    Parameters
+    ----------
+    measured, computed : (..., n_frfs) arrays
+        1/kg.
+    deviations : (..., n_frfs) array
+        Of the measured ones.
+    floor : (..., 1) array
+        Size of the measured mode.
+
+    Returns
+    -------
+    (..., n_frfs) array
+        Minus the logarithm of Cauchy's density, over that of its middle.
+    """
+    sizes = np.sqrt((np.abs(measured) ** 2 + np.abs(computed) ** 2) / 2)
+    scales = np.sqrt((SHAPE_SCALE * np.hypot(sizes, SHAPE_SCALE * floor)) ** 2 + deviations**2)
+    errors = np.abs(measured - computed) / np.maximum(scales, np.finfo(float).tiny)
+    return np.asarray(np.log1p(errors**2))
+
+
+def costs_of_absence(measured: MeasuredModes, products: ComplexArray) -> FloatArray:
+    """Give the costs of modes without a counterpart, measured ones or computed ones: little for one that hardly shows.
 
     At most a mode is far in frequency, and its products of shapes are off by their own size. A false mode of a fit is
     small beside the others.
+
+    Parameters
+    ----------
+    measured : MeasuredModes
+        The measurement.
+    products : (n_modes, n_frfs) array
+        Of the modes in question, 1/kg.
+
+    Returns
+    -------
+    (n_modes,) array
+        As for `cost_of_products`.
     """
     visible = _visibility(measured, products)
     shapes = np.minimum(np.log1p(visible**2).sum(axis=1), cost_of_own_size(products.shape[1]))
@@ -265,5 +321,5 @@ def unrelated_log_likelihood(measured: MeasuredModes) -> float:
     float
         Natural logarithm.
     """
-    off = np.minimum(_costs_of_absence(measured, measured.products), cost_of_own_size(measured.products.shape[1]))
+    off = np.minimum(costs_of_absence(measured, measured.products), cost_of_own_size(measured.products.shape[1]))
     return -float(off.sum())

@@ -33,11 +33,12 @@ def exchanged_sensors(situation: Situation) -> Iterator[Cause]:
     """
     outputs = _unique(label.output_dof.unsigned for label in situation.measured.labels)
     pairs = list(combinations(outputs, 2))
+    keys = {dof: situation.key_of("output", _channel(situation, dof), "dof") for dof in outputs}
+    written = [label.output_dof for label in situation.measured.labels]
     for first, second in pairs:
         says = f"the sensors at {first.name} and {second.name} are exchanged: exchange their dofs"
-        key = "; ".join(situation.key_of("output", _channel(situation, dof), "dof") for dof in (first, second))
+        key = f"{keys[first]}; {keys[second]}"
         moved = {first: second, second: first}
-        written = [label.output_dof for label in situation.measured.labels]
         yield _moved(situation, says, key, moved, {}, len(pairs), gain=_gain_of_exchange(written, moved))
 
 
@@ -83,10 +84,10 @@ def misplaced_sensor(situation: Situation) -> Iterator[Cause]:
     places = {dof: [other for other in situation.computed.shapes if _is_along(other, dof)] for dof in outputs}
     count = sum(map(len, places.values()))
     for dof, nodes in places.items():
+        channel = _channel(situation, dof)
+        key = situation.key_of("output", channel, "dof")
         for place in nodes:
-            channel = _channel(situation, dof)
             says = f"the sensor of '{channel}' seems to sit near {place.name}, not at {dof.name}: correct its dof"
-            key = situation.key_of("output", channel, "dof")
             yield _moved(situation, says, key, {dof: place}, {}, count)
 
 
