@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.assessment.causes.cause import Cause, Situation
-    from frf_ipz.dofs import Dof
+    from frf_ipz.dofs import AnyDof
 
 PLACES_AT_ONCE = 256
 
@@ -50,8 +50,8 @@ class CostBounds:
     by_frf: FloatArray
     whole: FloatArray
     alone: FloatArray
-    outputs: tuple[Dof, ...]
-    inputs: tuple[Dof, ...]
+    outputs: tuple[AnyDof, ...]
+    inputs: tuple[AnyDof, ...]
 
     def largest_logs(self, causes: Sequence[Cause]) -> FloatArray:
         """Give what `log_evidence` of each cause is at most.
@@ -67,7 +67,7 @@ class CostBounds:
             Infinity for one that changes more than where one sensor sits.
         """
         logs = np.full(len(causes), np.inf)
-        places: dict[Dof, list[int]] = defaultdict(list)
+        places: dict[AnyDof, list[int]] = defaultdict(list)
         for number, cause in enumerate(causes):
             if _moves_sensors_only(cause) and len(cause.moved_outputs) == 1 and np.all(cause.gain == 1):
                 places[next(iter(cause.moved_outputs))].append(number)
@@ -90,10 +90,10 @@ class CostBounds:
             costs += self._costs_at([place], frfs, gain) - self.by_frf[:, frfs].sum(axis=1)
         return -float(self._least(costs)[0])
 
-    def _frfs_of(self, sensor: Dof) -> IntArray:
+    def _frfs_of(self, sensor: AnyDof) -> IntArray:
         return np.array([number for number, dof in enumerate(self.outputs) if dof == sensor], np.int64)
 
-    def _costs_at(self, places: Sequence[Dof], frfs: IntArray, gain: complex | ComplexArray = 1.0) -> FloatArray:
+    def _costs_at(self, places: Sequence[AnyDof], frfs: IntArray, gain: complex | ComplexArray = 1.0) -> FloatArray:
         """Costs of some FRFs where their sensor sits elsewhere, (n_places, n_pairs)."""
         shapes = self.situation.computed.shapes
         at_inputs = np.stack([shapes[self.inputs[frf]] for frf in frfs.tolist()], axis=1)
