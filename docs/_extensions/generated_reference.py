@@ -22,9 +22,10 @@ from frf_ipz.cli.commands import app
 from frf_ipz.diagnosis import result as diagnosis_result
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
+from frf_ipz.export.reduced_model_file import REDUCED_MODEL
 from frf_ipz.export.run_tables import FILES
 from frf_ipz.export.state_space import StateSpaceModel
-from frf_ipz.export.state_space_files import ENSEMBLE, REDUCED_MODEL
+from frf_ipz.export.state_space_files import ENSEMBLE
 from frf_ipz.export.uncertainty import UncertaintyWeights
 from frf_ipz.fe.model_file import model_kinds
 from frf_ipz.fleet import population

@@ -46,10 +46,14 @@ from .errors import NumericalError as NumericalError
 from .errors import PairingError as PairingError
 from .errors import QuantityError as QuantityError
 from .errors import ShapeError as ShapeError
+from .export.decoupling import RigidBodyDecoupling as RigidBodyDecoupling
+from .export.decoupling import decouple_rigid_body as decouple_rigid_body
 from .export.frequency_response_data import to_frd as to_frd
 from .export.modal_files import write_frfs as write_frfs
 from .export.modal_files import write_modes as write_modes
 from .export.options import ExportOptions as ExportOptions
+from .export.reduced_model_file import read_updated_model as read_updated_model
+from .export.reduced_model_file import rebuild_state_space as rebuild_state_space
 from .export.state_space import StateSpaceModel as StateSpaceModel
 from .export.state_space import to_state_space as to_state_space
 from .export.state_space import to_state_space_ensemble as to_state_space_ensemble

@@ -72,7 +72,7 @@ def test_the_page_is_light_enough_to_be_sent_on(run):
 
 def test_the_model_file_holds_matrices_and_dofs(run):
     with np.load(run.path / "updated_model.npz") as model:
-        assert set(model.files) == {"M", "B", "K", "dofs"}
+        assert set(model.files) >= {"M", "B", "K", "dofs"}
         assert model["M"].shape == model["B"].shape == model["K"].shape == (len(model["dofs"]),) * 2
         assert {"49:z", "69:z", "89:z", "101:z"} <= set(model["dofs"])
 

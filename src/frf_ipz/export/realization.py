@@ -11,7 +11,7 @@ rounding would turn a double integrator into a stable and an unstable pole: ``[[
 
 from __future__ import annotations
 
-from math import factorial
+from math import ceil, factorial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -32,6 +32,7 @@ ROUNDING = (
     1e3 * EPS
 )  # of the sum of all terms' sizes: a reduced model's matrices hold the condition number of its modes
 LOWEST_RATE = 1e-6  # of the highest natural frequency: lower bound of the rate by which a mode is scaled
+WHOLE_SAMPLES = 1e-9  # of a sample: a delay written in decimal digits is whole samples to within rounding
 UNSEEN = 1e-9  # of the largest share of a mode in a port: no resonance lifts what is below to where it matters
 
 
@@ -286,6 +287,105 @@ def to_first_order(system: SecondOrder, powers: Sequence[int]) -> Matrices:
     C[power == 2] = system.outputs[power == 2] @ A[1::2]
     D[power == 2] = system.outputs[power == 2] @ system.inputs
     return Matrices(A, B, C, D)
+
+
+def balance_modes(system: Matrices, n_modes: int) -> Matrices:
+    """Scale the two states of each mode so that inputs drive them as much as outputs see them.
+
+    The coordinates are then balanced but for terms of the order of the damping ([Gawronski2004], section 4.2), and
+    those of a rigid-body mode are scaled alike. The blocks of modes in A stay as they are.
+
+    [Gawronski2004] W. K. Gawronski, Advanced structural dynamics and active control of structures, Springer, 2004,
+    doi:10.1007/978-0-387-21836-6.
+
+    Parameters
+    ----------
+    system : Matrices
+        Of `to_first_order`.
+    n_modes : int
+        Pairs of states.
+
+    Returns
+    -------
+    Matrices
+        With the same FRFs.
+    """
+    driven = np.linalg.norm(system.B.reshape(n_modes, -1), axis=1)
+    seen = np.linalg.norm(system.C.reshape(len(system.C), n_modes, 2), axis=(0, 2))
+    is_minimal = (driven > 0) & (seen > 0)
+    factors = np.repeat(np.sqrt(np.where(is_minimal, seen, 1.0) / np.where(is_minimal, driven, 1.0)), 2)
+    ratios = factors[:, None] / factors  # exactly 1 within a mode
+    return Matrices(system.A * ratios, system.B * factors[:, None], system.C / factors, system.D)
+
+
+def with_input_delay(system: Matrices, delay_s: float, order: int) -> Matrices:
+    """Delay all inputs of a continuous system by a Pade approximant.
+
+    Parameters
+    ----------
+    system : Matrices
+        Continuous.
+    delay_s : float
+        Positive.
+    order : int
+        Of the approximant, 1 or more.
+
+    Returns
+    -------
+    Matrices
+        With the states of the approximants at the end.
+    """
+    n_inputs = system.B.shape[1]
+    A, B, C, D = (np.kron(np.eye(n_inputs), part) for part in pade_delay(delay_s, order))
+    zero = np.zeros((len(A), len(system.A)))
+    return Matrices(
+        np.block([[system.A, system.B @ C], [zero, A]]),
+        np.vstack([system.B @ D, B]),
+        np.hstack([system.C, system.D @ C]),
+        system.D @ D,
+    )
+
+
+def discretise_with_input_delay(system: Matrices, sample_time_s: float, delay_s: float) -> Matrices:
+    """Discretise for inputs that are held between samples and act late: exact for any delay.
+
+    Within a sample the inputs of two samples act one after the other ([FranklinPowellWorkman1998], section 4.3.4).
+
+    [FranklinPowellWorkman1998] G. F. Franklin, J. D. Powell, M. Workman, Digital control of dynamic systems, third
+    edition, Addison-Wesley, 1998.
+
+    Parameters
+    ----------
+    system : Matrices
+        Continuous.
+    sample_time_s, delay_s : float
+        Positive.
+
+    Returns
+    -------
+    Matrices
+        Discrete; the inputs of the samples before are states at the end, the last one first.
+    """
+    count = max(ceil(delay_s / sample_time_s - WHOLE_SAMPLES), 1)  # samples whose inputs are still to act
+    late = delay_s - (count - 1) * sample_time_s
+    is_whole = sample_time_s - late <= WHOLE_SAMPLES * sample_time_s
+    whole = discretise(system, sample_time_s)
+    fresh = np.zeros_like(whole.B) if is_whole else discretise(system, sample_time_s - late).B
+    n_states, n_inputs = whole.B.shape
+    registers = [np.zeros((n_states, n_inputs)) for _ in range(count)]
+    registers[-1] = whole.B if is_whole else whole.B - fresh
+    driven = fresh
+    if count > 1:
+        registers[-2], driven = fresh, np.zeros_like(fresh)
+    shift = np.kron(np.eye(count, k=-1), np.eye(n_inputs))
+    first = np.kron(np.eye(count)[:, :1], np.eye(n_inputs))
+    through = np.hstack([np.zeros((len(whole.D), (count - 1) * n_inputs)), whole.D])
+    return Matrices(
+        np.block([[whole.A, np.hstack(registers)], [np.zeros((count * n_inputs, n_states)), shift]]),
+        np.vstack([driven, first]),
+        np.hstack([whole.C, through]),
+        np.zeros_like(whole.D),
+    )
 
 
 def pade_delay(delay_s: float, order: int) -> Matrices:

@@ -19,15 +19,19 @@ from frf_ipz.errors import InputError
 from frf_ipz.export.options import ExportOptions
 from frf_ipz.export.ports import Ports, choose_ports
 from frf_ipz.export.realization import (
+    Matrices,
     SecondOrder,
     Selection,
+    balance_modes,
     condense_high_modes,
     discretise,
+    discretise_with_input_delay,
     modal_form,
     select_states,
     take_states,
     to_first_order,
     with_delays,
+    with_input_delay,
 )
 from frf_ipz.frf import require_measured
 from frf_ipz.updating.scale import MeasuredScale
@@ -64,7 +68,7 @@ class StateSpaceModel(Concise):
     dt : float
         Sample time in s; 0 for continuous time.
     input_names, output_names : tuple of str
-        DOF labels with the signs of the test.
+        DOF labels with the signs of the test, and what they measure where one is measured in several ways.
     state_names : tuple of str
         Names of the states.
     input_units, output_units : tuple of str
@@ -154,7 +158,7 @@ def make_state_space(
     """
     _require_exported(measured, updated_model, options, delays_s)
     chosen = options or ExportOptions()
-    ports = _ports(measured, points, chosen, delays_s)
+    ports = _ports(measured, updated_model, points, chosen, delays_s)
     system = _modal_system(updated_model.model, updated_model.scale, ports, chosen)
     return _to_state_space(system, select_states(system), ports, chosen, scale=updated_model.scale)
 
@@ -194,7 +198,7 @@ def make_state_space_ensemble(
     """
     _require_exported(measured, updated_model, options, delays_s)
     chosen = options or ExportOptions()
-    ports = _ports(measured, points, chosen, delays_s)
+    ports = _ports(measured, updated_model, points, chosen, delays_s)
     members = updated_model.ensemble[: chosen.ensemble]
     scales = updated_model.scale.members(len(members))
     selection = select_states(
@@ -207,6 +211,33 @@ def make_state_space_ensemble(
         for (mass, damping, stiffness), scale in zip(members, scales, strict=True)
     )
     return tuple(_to_state_space(system, selection, ports, chosen, scale=updated_model.scale) for system in systems)
+
+
+def realise_state_space(model: ReducedModel, ports: Ports, options: ExportOptions) -> StateSpaceModel:
+    """Turn a reduced model into a state space between ports that are chosen already.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model, in the units of its FE model.
+    ports : Ports
+        Inputs and outputs.
+    options : ExportOptions
+        Its form.
+
+    Returns
+    -------
+    StateSpaceModel
+        Continuous, or sampled where the options say so.
+
+    Raises
+    ------
+    InputError
+        If residual flexibility is required as feedthrough of a velocity or an acceleration.
+    """
+    scale = MeasuredScale()
+    system = _modal_system(model, scale, ports, options)
+    return _to_state_space(system, select_states(system), ports, options, scale=scale)
 
 
 def to_state_space(
@@ -388,15 +419,15 @@ def _to_state_space(
 ) -> StateSpaceModel:
     outputs = ports.outputs
     matrices = to_first_order(take_states(system, selection), [output.quantity.power for output in outputs])
+    matrices = balance_modes(matrices, len(matrices.A) // 2)
     modes = [f"rigid-body mode {number + 1}" for number in range(selection.seen)]
     modes += [f"mode {system.n_rigid + place + 1}" for place in np.flatnonzero(selection.elastic)]
     names = [f"{mode} {quantity}" for mode in modes for quantity in ("displacement", "velocity")]
     delayed = [output for output in outputs if output.delay_s > 0 and options.pade_order]
-    names += [f"delay of {output.dof} {order + 1}" for output in delayed for order in range(options.pade_order)]
+    names += [f"delay of {output.name} {order + 1}" for output in delayed for order in range(options.pade_order)]
     matrices = with_delays(matrices, [output.delay_s for output in outputs], options.pade_order)
-    if options.sample_time_s > 0:
-        matrices = discretise(matrices, options.sample_time_s)
-    A, B, C, D = matrices
+    A, B, C, D = _with_loop_delay(matrices, options)
+    names += _names_of_loop_delay(len(A) - len(names), ports, options)
     return StateSpaceModel(
         A=A,
         B=B,
@@ -404,12 +435,28 @@ def _to_state_space(
         D=D,
         dt=options.sample_time_s,
         input_names=tuple(str(dof) for dof in ports.inputs),
-        output_names=tuple(str(output.dof) for output in outputs),
+        output_names=tuple(output.name for output in outputs),
         state_names=tuple(names),
         input_units=ports.input_units,
         output_units=tuple(output.unit for output in outputs),
         notes=(*_notes(system, selection), *_scale_notes(scale)),
     )
+
+
+def _with_loop_delay(system: Matrices, options: ExportOptions) -> Matrices:
+    delay_s, sample_time_s = options.delay_s, options.sample_time_s
+    if sample_time_s > 0:
+        delayed = discretise_with_input_delay(system, sample_time_s, delay_s) if delay_s > 0 else None
+        return delayed or discretise(system, sample_time_s)
+    return with_input_delay(system, delay_s, options.pade_order) if delay_s > 0 else system
+
+
+def _names_of_loop_delay(count: int, ports: Ports, options: ExportOptions) -> list[str]:
+    inputs = [str(dof) for dof in ports.inputs]
+    each = count // len(inputs)
+    if options.sample_time_s > 0:
+        return [f"input {name}, {sample + 1} samples before" for sample in range(each) for name in inputs]
+    return [f"delay of input {name} {order + 1}" for name in inputs for order in range(each)]
 
 
 def _notes(system: SecondOrder, selection: Selection) -> tuple[str, ...]:
@@ -438,6 +485,11 @@ def _scale_notes(scale: MeasuredScale) -> tuple[str, ...]:
 
 
 def _ports(
-    measured: Measured, points: Sequence[AnyDof | str], options: ExportOptions, delays_s: Mapping[str, float] | None
+    measured: Measured,
+    updated_model: UpdatedModel,
+    points: Sequence[AnyDof | str],
+    options: ExportOptions,
+    delays_s: Mapping[str, float] | None,
 ) -> Ports:
-    return choose_ports(measured.connections, list(as_dofs(points)), options, delays_s or {})
+    known = updated_model.model.expanded_dofs
+    return choose_ports(measured.connections, list(as_dofs(points)), options, delays_s or {}, known)

@@ -1,7 +1,7 @@
 """Files of the controller-ready model and of what robust design needs besides.
 
-The state space as JSON or for MATLAB, the matrices of the reduced model, members of the posterior, and the uncertainty
-weight of every output. Nothing is lost on the way: what is read equals what was written, to the last bit.
+The state space as JSON or for MATLAB, members of the posterior, and the uncertainty weight of every output. Nothing is
+lost on the way: what is read equals what was written, to the last bit.
 """
 
 from __future__ import annotations
@@ -28,15 +28,8 @@ if TYPE_CHECKING:
 
     import control
 
-    from frf_ipz.structure import ReducedModel
 
 SUFFIXES = (".json", ".mat")
-REDUCED_MODEL = {  # arrays of updated_model.npz
-    "M": "(r, r) mass matrix, SI",
-    "B": "(r, r) damping matrix, SI",
-    "K": "(r, r) stiffness matrix, SI",
-    "dofs": "(r,) DOF label of each row",
-}
 ENSEMBLE = {  # what is different in the file of an ensemble
     "A": "(n_states, n_states, n_members), SI units",
     "B": "(n_states, n_inputs, n_members)",
@@ -178,29 +171,6 @@ def read_state_space(path: str | Path) -> control.StateSpace:
     ['6:+z', '11:+z', '9:+z']
     """
     return to_control(read_state_space_arrays(path))
-
-
-def write_reduced_model(model: ReducedModel, path: str | Path) -> None:
-    """Write the matrices of a reduced model.
-
-    Parameters
-    ----------
-    model : ReducedModel
-        The model.
-    path : str or Path
-        An ``.npz`` file: ``M``, ``B``, ``K`` and ``dofs`` (labels of the rows).
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
-    names = np.array([dof.name for dof in model.dofs])
-    with replacing(Path(path)) as target, target.open("wb") as stream:
-        arrays: dict[str, Any] = dict(
-            zip(REDUCED_MODEL, (model.mass, model.damping, model.stiffness, names), strict=True)
-        )
-        np.savez(stream, **arrays)
 
 
 def write_ensemble(models: Sequence[StateSpaceModel], path: str | Path) -> None:

@@ -18,6 +18,8 @@ from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
 from frf_ipz.display import Concise
 from frf_ipz.dofs import as_dofs
 from frf_ipz.errors import InputError
+from frf_ipz.export.options import ExportOptions
+from frf_ipz.export.ports import choose_ports
 from frf_ipz.frf import FrfLabel, require_measured
 from frf_ipz.prediction.ensemble import ModelEnsemble
 from frf_ipz.quantities import FrfQuantity
@@ -100,6 +102,7 @@ def estimate_uncertainty_weights(
     updated_model: UpdatedModel,
     *,
     points: Sequence[AnyDof | str] = (),
+    options: ExportOptions | None = None,
     frequency_hz: FloatArray | None = None,
 ) -> UncertaintyWeights:
     """Bound the relative error of the members of the posterior, for every sensor and point of interest.
@@ -112,6 +115,8 @@ def estimate_uncertainty_weights(
         With an ensemble.
     points : sequence of Dof or str
         Points of interest.
+    options : ExportOptions, optional
+        Which ports and quantities the state space has; by default all sensors and points as they are measured.
     frequency_hz : (n_lines,) array, optional
         Frequencies at which the bound has to hold, above 0, Hz; `WEIGHT_LINES` of the band at equal ratios where they
         are left out.
@@ -160,13 +165,12 @@ def estimate_uncertainty_weights(
             f"the update by '{updated.method}' has no ensemble, so its uncertainty is unknown; use [update] "
             "method = 'minimal-change' with ensemble = 200"
         )
+    ports = choose_ports(labels, as_dofs(points), options or ExportOptions(), {}, updated.model.expanded_dofs)
     s = 2j * np.pi * np.asarray(frequency_hz, float)
-    outputs = tuple(dict.fromkeys([*(label.output_dof for label in labels), *as_dofs(points)]))
-    inputs = tuple(dict.fromkeys(label.input_dof for label in labels))
-    errors = np.stack([_relative_error(updated, output, inputs, s) for output in outputs], axis=1)
+    errors = np.stack([_relative_error(updated, output.dof, ports.inputs, s) for output in ports.outputs], axis=1)
     weights = [_bound(np.asarray(frequency_hz, float), error) for error in errors.T]
     return UncertaintyWeights(
-        output_names=tuple(str(output) for output in outputs),
+        output_names=tuple(output.name for output in ports.outputs),
         frequency_hz=np.asarray(frequency_hz, float),
         relative_error=errors,
         numerators=np.array([above for above, _ in weights]),

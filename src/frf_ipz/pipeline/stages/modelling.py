@@ -11,7 +11,7 @@ from frf_ipz.diagnosis.position_uncertainty import propagate_position_tolerance
 from frf_ipz.errors import InputError
 from frf_ipz.export import run_tables as tables
 from frf_ipz.export.parquet import write_table
-from frf_ipz.export.state_space_files import write_reduced_model
+from frf_ipz.export.reduced_model_file import write_reduced_model
 from frf_ipz.fe.reduction.reduce import reduce_to_dofs
 from frf_ipz.pairing.pair import pair_roots
 from frf_ipz.pipeline.sensors import unweighed_sensors
@@ -166,6 +166,7 @@ def update(
     tolerance = stated.position_tolerance_m_per_m if corrected_by else 0.0
     sensors = unweighed_sensors(runner.inputs.test, modal_fit.labels)
     nominal = runner.inputs.fe_model
+    measured = _once(dof for label in modal_fit.labels for dof in (label.output_dof, label.input_dof))
     if options.parameters == "diagnosis" and corrected_by is None:
         raise InputError(
             f"{runner.inputs.source}: [update] parameters = 'diagnosis' needs what a diagnosis has found; set "
@@ -198,7 +199,7 @@ def update(
         lambda result: {
             "pairs.parquet": partial(write_table, tables.pair_table(pairs, result.after)),
             "parameters.parquet": partial(write_table, tables.history_table(result)),
-            "updated_model.npz": partial(write_reduced_model, result.model),
+            "updated_model.npz": partial(write_reduced_model, result.model, dofs=(*measured, *runner.inputs.points)),
         },
     )
 

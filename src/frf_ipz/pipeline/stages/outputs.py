@@ -241,7 +241,7 @@ def _design_files(
     """Members of the posterior, and the bound of what they do to each output."""
     members = make_state_space_ensemble(modal_fit, updated, points=points, options=options, delays_s=delays)
     weights = estimate_uncertainty_weights(
-        modal_fit, updated, points=points, frequency_hz=np.geomspace(*modal_fit.band_hz, WEIGHT_LINES)
+        modal_fit, updated, points=points, options=options, frequency_hz=np.geomspace(*modal_fit.band_hz, WEIGHT_LINES)
     )
     return {
         "statespace_ensemble.mat": partial(write_ensemble, members),
