@@ -364,7 +364,7 @@ class ModelMatrices:
         )
         n_massless = made._count_massless(errors, allow_negative_stiffness=options.allow_negative_stiffness)
         if n_massless:
-            notes.append(f"{n_massless} motions have no mass: they follow the others statically")
+            notes.append(f"motions without mass: {n_massless}, which follow the others statically")
         return replace(made, n_massless=n_massless, notes=tuple(notes))
 
     def part(self, what: str, matrix: Matrix) -> Matrix:

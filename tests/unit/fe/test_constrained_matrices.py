@@ -75,7 +75,7 @@ def test_rotations_without_mass_follow_statically(monkeypatch, left, dense_order
     assert_allclose(frequencies[n_rigid:], expected[n_rigid:5], rtol=ROUNDING)
     assert frequencies[:n_rigid].tolist() == [0] * n_rigid
     assert model.n_modes == int(moving.sum())
-    assert "have no mass" in model.notes[-1]
+    assert "without mass" in model.notes[-1]
 
 
 def test_frfs_at_rotations_without_mass_are_exact():

@@ -80,8 +80,8 @@ class MatricesOptions:
     mass, stiffness : str
         File of a matrix, in any format that is read; one file may hold both.
     dofs : str, optional
-        File that names the rows: CSV, CalculiX's ``.dof`` or Ansys's ``.mapping``. Not needed where the files of the
-        matrices name them.
+        File that names the rows: CSV, CalculiX's ``.dof``, Ansys's ``.mapping``, Nastran's ``.op2`` or ``.asm``. Not
+        needed where the files of the matrices name them.
     damping : str, optional
         File of viscous damping.
     nodes : str, optional
@@ -232,6 +232,9 @@ class _Files:
     def read(cls, path: Path, options: MatricesOptions, names: Mapping[str, str]) -> _Files:
         table = read_rows(path.parent / options.dofs) if options.dofs is not None else None
         ordered_by = options.dofs or options.stiffness
+        if table is not None and table.choices:
+            stiffness = _read_one(path, "stiffness", options.stiffness, options, order=None, ordered_by="")
+            table = table.of_order(stiffness.matrix.shape[0])
         order = None if table is None else len(table.dofs)
         whole: dict[str, StoredMatrix] = {}
         dofs = () if table is None else table.dofs

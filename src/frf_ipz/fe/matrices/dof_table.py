@@ -42,11 +42,29 @@ class DofTable:
         Where nodes are, as far as the file says it, in the unit of the model's length.
     axes : mapping of int to (3, 3) array
         Nodes with axes of their own, which are the rows of the array.
+    choices : tuple of DofTable
+        Selections of the rows, where matrices may have one of several.
     """
 
     dofs: tuple[Dof, ...]
     positions: Mapping[int, Sequence[float]]
     axes: Mapping[int, FloatArray]
+    choices: tuple[DofTable, ...] = ()
+
+    def of_order(self, order: int) -> DofTable:
+        """Choose the selection of rows that a matrix has.
+
+        Parameters
+        ----------
+        order : int
+            Its number of rows.
+
+        Returns
+        -------
+        DofTable
+            The first choice of that order; this one where there is none.
+        """
+        return next((choice for choice in self.choices if len(choice.dofs) == order), self)
 
 
 def read_dof_table(path: Path) -> DofTable:

@@ -1,4 +1,4 @@
-"""Files that say what the rows of matrices are: ``dofs.csv``, CalculiX's ``.dof``, Ansys's ``.mapping``."""
+"""Files that say what the rows of matrices are: ``dofs.csv``, and those of CalculiX, Ansys and Nastran."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.matrices.dof_table import DofTable, read_dof_table
+from frf_ipz.fe.matrices.nastran_rows import read_uset
 from frf_ipz.input_files import read_text
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ def read_rows(path: Path) -> DofTable:
     """
     if path.suffix.lower() == ".dof":
         return _read_calculix(path)
+    if path.suffix.lower() in {".op2", ".asm"}:
+        return read_uset(path)
     if path.suffix.lower() == ".mapping":
         return _read_ansys(path)
     return read_dof_table(path)

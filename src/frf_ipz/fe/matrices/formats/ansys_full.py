@@ -1,0 +1,83 @@
+"""Ansys's ``.full`` files with mass, stiffness and the names of their rows, by ansys-mapdl-reader."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
+from frf_ipz.errors import FileFormatError
+from frf_ipz.fe.matrices.stored import MOST_BYTES, MatrixFormat, MatrixRequest, StoredMatrix, both_triangles
+from frf_ipz.input_files import digest_file, read_bytes
+
+LIBRARY = "ansys.mapdl.reader"
+PROCESS = "frf_ipz.fe.matrices.ansys_full_process"
+INTERNAL, MOST_LABELS = 10**12, 100  # numbers of DOFs that are no motions
+LONGEST_S = 600.0
+LAST_LETTERS = 200
+
+
+def _read(request: MatrixRequest) -> StoredMatrix:
+    path = request.path
+    if request.what == "damping":
+        raise FileFormatError(path, "has mass and stiffness; give the damping as Matrix Market, or as a ratio")
+    if not _is_installed():
+        raise FileFormatError(
+            path,
+            "is a .full file of Ansys, whose reader ansys-mapdl-reader is not installed: run pip install "
+            "'frf_ipz[ansys]', or export it by HBMAT",
+        )
+    arrays = _arrays(path, digest_file(path))
+    labels = arrays["labels"]
+    if f"{request.what}_values" not in arrays:
+        raise FileFormatError(path, f"has no {request.what} matrix; write it by a modal analysis (WRFULL)")
+    rows, columns, values = (arrays[f"{request.what}_{part}"] for part in ("rows", "columns", "values"))
+    entries: Any = sparse.coo_array((values, (rows, columns)), shape=(len(labels),) * 2)
+    return StoredMatrix(matrix=both_triangles(sparse.csr_array(entries), path).matrix, dofs=_dofs(labels))
+
+
+FORMAT = MatrixFormat(rank=3, fits=lambda path, head: path.suffix.lower() == ".full", read=_read)  # noqa: ARG005
+
+
+def _is_installed() -> bool:
+    try:
+        return find_spec(LIBRARY) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+@lru_cache(maxsize=1)  # mass and stiffness are asked for one after the other
+def _arrays(path: Path, digest: str) -> Any:  # noqa: ANN401 - named arrays
+    """Let another process read the file: a damaged one ends it."""
+    del digest
+    with TemporaryDirectory() as folder:
+        copy, target = Path(folder) / "file.full", Path(folder) / "read.npz"
+        copy.write_bytes(read_bytes(path, most_bytes=MOST_BYTES))
+        command = [sys.executable, "-m", PROCESS, str(copy), str(target)]
+        try:
+            done = subprocess.run(command, capture_output=True, timeout=LONGEST_S, check=False)
+        except subprocess.TimeoutExpired:
+            raise FileFormatError(path, f"could not be read within {LONGEST_S:g} s; is it damaged?") from None
+        if done.returncode or not target.exists():
+            said = " ".join(done.stderr.decode("utf-8", "replace").split())[-LAST_LETTERS:]
+            raise FileFormatError(path, f"cannot be read as a .full file of Ansys: {said or 'it is damaged'}")
+        arrays = np.load(io.BytesIO(read_bytes(target)), allow_pickle=False)
+        return {name: arrays[name] for name in arrays.files}
+
+
+def _dofs(labels: Any) -> tuple[Dof, ...]:  # noqa: ANN401 - node and number of the DOF, from 0
+    return tuple(
+        Dof(node, DIRECTIONS[number])
+        if 0 <= number < len(DIRECTIONS) and node > 0
+        else Dof(INTERNAL + MOST_LABELS * abs(node) + number, GENERALISED)
+        for node, number in labels.tolist()
+    )

@@ -1,0 +1,55 @@
+"""Nastran's punch files with DMIG cards, which name their rows, by pyyeti."""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import TYPE_CHECKING, Any
+
+from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
+from frf_ipz.errors import FileFormatError
+from frf_ipz.fe.matrices.stored import (
+    MatrixFormat,
+    MatrixRequest,
+    StoredMatrix,
+    as_matrix,
+    both_triangles,
+    errors_of_library,
+    import_library,
+)
+from frf_ipz.input_files import read_text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+KIND = "a punch file of Nastran with DMIG cards"
+CARD = re.compile(rb"(?m)^DMIG[ *,]")
+HEADER = re.compile(r"(?mi)^DMIG[ ,]+(\w{1,8})[ ,]+0[ ,]")
+
+
+def _fits(path: Path, head: bytes) -> bool:
+    return path.suffix.lower() in {".pch", ".dmig"} or CARD.search(head) is not None
+
+
+def _read(request: MatrixRequest) -> StoredMatrix:
+    path = request.path
+    bulk = import_library(path, "pyyeti.nastran.bulk", kind=KIND, extra="nastran")
+    text = read_text(path)
+    names = list(dict.fromkeys(name.lower() for name in HEADER.findall(text)))
+    if not names:
+        raise FileFormatError(path, "has no header card of a DMIG matrix; punch it again, or export OUTPUT4")
+    chosen = request.choose(dict.fromkeys(names))
+    with errors_of_library(path, KIND):
+        frames = bulk.rddmig(io.StringIO(text), chosen, square=True, follow_includes=False)
+        frame: Any = next(frame for name, frame in frames.items() if name.lower() == chosen)
+        values, labels = frame.to_numpy(), frame.index.tolist()
+    unbound = MatrixRequest(path=path, what=request.what)
+    stored = both_triangles(as_matrix(values, unbound), path)
+    dofs = tuple(
+        Dof(int(node), DIRECTIONS[int(number) - 1] if 1 <= number <= len(DIRECTIONS) else GENERALISED)
+        for node, number in labels
+    )
+    return StoredMatrix(matrix=stored.matrix, dofs=dofs, notes=stored.notes)
+
+
+FORMAT = MatrixFormat(rank=4, fits=_fits, read=_read)
