@@ -239,3 +239,38 @@ def test_errors_of_late_records_are_stated(share):
         seeds=range(2),
     )
     assert 0.2 < ratio < 2.5
+
+
+@pytest.mark.parametrize("late", [0, 1])
+def test_records_that_begin_at_the_peak_say_nothing_of_the_force(tmp_path, late):
+    def begin(signals):
+        return signals[:, int(np.argmax(signals[0])) + late :]
+
+    with pytest.raises(frf_ipz.InputError, match=r"begin at the peak of the impact or after it \(hits/hit_1.csv, "):
+        estimate(tmp_path, begin, bad=range(5))
+    result = estimate(tmp_path, begin)
+    assert list(result.records.used) == [True, True, False, True, True]
+    assert "begins at the peak of the impact or after it" in result.records.marks[2]
+
+
+def test_lines_where_late_records_lack_most_of_the_force_are_not_used():
+    """Where the recorded part has a zero, FRFs would have a pole."""
+    recordings = []
+    for seed in range(5):
+        signals = begin_late(impact(Structure(), length_s=1e-3, at_s=0.06), 0.33)
+        signals = signals + 0.01 * np.random.default_rng(seed).standard_normal(signals.shape)
+        recordings.append(
+            frf_ipz.Recording(
+                force=signals[0],
+                responses=signals[1:],
+                sample_rate_hz=1 / STEP_S,
+                input_dof="7:+z",
+                output_dofs=["1:+z", "2:+z"],
+            )
+        )
+    frfs = frf_ipz.estimate_frfs(frf_ipz.VibrationTest.from_recordings(recordings)).frfs
+    is_known = np.isfinite(frfs.variance).all(axis=1)
+    last = frfs.frequency_hz[is_known][-1]
+    assert 250 < last < 1000
+    assert not is_known[frfs.frequency_hz > last].any()
+    assert is_known[frfs.in_band((1.0, last))].all()

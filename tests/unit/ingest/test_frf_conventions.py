@@ -55,6 +55,11 @@ def test_conjugated_frfs_are_named(tmp_path, power):
     )
 
 
+def test_one_conjugated_frf_beside_others_is_named(tmp_path):
+    values = np.column_stack([VALUES[:, 0], np.conj(VALUES[:, 1]), VALUES[:, 2:]])
+    assert "2:+z / 7:+z looks conjugated beside the other FRFs" in message(tmp_path, values)
+
+
 @pytest.mark.parametrize("step", [1, 4, 9])
 def test_conjugated_frfs_are_named_on_coarse_lines_and_not_seen_in_noise(tmp_path, step):
     assert "look conjugated" in message(tmp_path, np.conj(VALUES)[::step], lines_hz=LINES_HZ[::step])
@@ -94,6 +99,12 @@ def test_magnitudes_alone_are_refused(tmp_path):
     for values in (np.abs(VALUES) + 0j, VALUES.real + 0j, VALUES.imag * 1j):
         assert "are zero: these are magnitudes only" in message(tmp_path, values)
     assert "is zero on all lines" in message(tmp_path, 0 * VALUES)
+
+
+@pytest.mark.parametrize("gain", [1.0, 1e-3])
+def test_level_in_decibels_and_phase_as_real_and_imaginary_part_are_refused(tmp_path, gain):
+    values = 20 * np.log10(gain * np.abs(VALUES)) + 1j * np.degrees(np.angle(VALUES))
+    assert "'magnitude_db', 'phase_deg'" in message(tmp_path, values)
 
 
 def test_magnitude_and_phase_as_real_and_imaginary_part_are_refused(tmp_path):

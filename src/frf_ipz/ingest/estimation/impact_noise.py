@@ -26,11 +26,12 @@ import numpy as np
 from scipy.special import gammainccinv
 
 from frf_ipz.ingest.estimation.variance import frf_variance
+from frf_ipz.ingest.signals.faults import MOST_MISSING
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
     from frf_ipz.ingest.estimation.spectra import SpectrumSums
 
 CHANCE = 1e-6  # share of lines without a force that are taken for one with
@@ -147,7 +148,8 @@ def impact_variance(sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray
     -------
     (n_lines, n_outputs) array
         E of the squared modulus of their error; of a single impact it follows from the noise in its own record. NaN
-        where there is no force, or none that stands out from its noise.
+        where there is no force, or none that stands out from its noise, and from the first line on where records that
+        begin within the pulse lack too much of it.
     """
     gain = np.abs(values) ** 2
     counts = np.maximum(sums.counts, 1)
@@ -161,4 +163,10 @@ def impact_variance(sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray
         unexplained += gain * (noise.force.T / counts) * (noise.force.T / power)
         variance = unexplained * power / own_power**2
         variance += gain * (noise.missing_force / sums.force).T ** 2 + (noise.missing_response / sums.force).T ** 2
-    return np.asarray(np.where(own_power > 0.0, variance, np.nan))
+        is_recorded = MOST_MISSING * power >= noise.missing_force.T
+    return np.asarray(np.where((own_power > 0.0) & _up_to_first_hole(is_recorded), variance, np.nan))
+
+
+def _up_to_first_hole(is_known: BoolArray) -> BoolArray:
+    """Mark the lines up to the first, beside that at 0 Hz, where something is not known: (n_lines, n) arrays."""
+    return np.asarray(np.logical_and.accumulate(is_known[1:], axis=0)[np.r_[0, : len(is_known) - 1]])

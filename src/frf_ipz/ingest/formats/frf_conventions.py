@@ -25,6 +25,9 @@ LARGEST_PHASES = (180.0, 360.0, np.pi, 2.0 * np.pi)  # in degrees and radians
 NEAR = 0.9  # of the largest phase: an FRF with a mode turns by half a turn
 FEWEST_LINES = 16  # on fewer, noise may turn either way
 CLEARLY = 0.5  # of the turning, weighted by the power: three quarters of it go against causality
+OFTEN, FLAT = 0.05, 0.1  # share of lines near the largest angle; median of levels over the largest
+SURELY = 0.9  # of the turning: of one FRF, on lines that resolve its peaks
+RESOLVED = 4.0  # lines that carry the turning: on fewer, its sense is chance
 PER_CENT = 10.0  # a coherence above this is one in per cent
 
 
@@ -123,10 +126,18 @@ def _refuse_magnitudes(frf: MeasuredFrf) -> None:
         if np.abs(part).max() <= ROUNDING * largest:
             problem = f"all {name} parts of the FRF {frf.label} are zero: these are magnitudes only, without a phase"
             raise FileFormatError(frf.source.path, f"{problem}; {way_out}")
-    if len(real) >= FEWEST_LINES and (real >= 0.0).all() and _looks_like_phase(imag):
-        problem = f"the FRF {frf.label} looks like magnitude and phase where real and imaginary part are expected"
-        columns = "columns = ['frequency_hz', 'magnitude', 'phase_deg']"
-        raise FileFormatError(frf.source.path, f"{problem}: no real part is negative; {way_out} with {columns}")
+    if len(real) < FEWEST_LINES or not _looks_like_phase(imag):
+        return
+    problem = f"the FRF {frf.label} looks like magnitude and phase where real and imaginary part are expected"
+    columns = "columns = ['frequency_hz', '{}', 'phase_deg']"
+    if (real >= 0.0).all():
+        text = f"{problem}: no real part is negative; {way_out} with {columns.format('magnitude')}"
+        raise FileFormatError(frf.source.path, text)
+    if _looks_like_level(real, imag):
+        text = (
+            f"{problem}: one part is a level in dB, the other an angle; {way_out} with {columns.format('magnitude_db')}"
+        )
+        raise FileFormatError(frf.source.path, text)
 
 
 def _looks_like_phase(imag: FloatArray) -> bool:
@@ -135,17 +146,38 @@ def _looks_like_phase(imag: FloatArray) -> bool:
     return any(NEAR * phase <= largest <= phase * (1.0 + PRINTED) for phase in LARGEST_PHASES)
 
 
+def _looks_like_level(real: FloatArray, imag: FloatArray) -> bool:
+    """Tell whether numbers are levels and angles: levels have no high peaks, angles stay at a half turn for long."""
+    sizes, angles = np.abs(real), np.abs(imag)
+    stays = np.mean(angles > NEAR * angles.max()) > OFTEN
+    return bool(stays and np.median(sizes) > FLAT * sizes.max())
+
+
 def _refuse_conjugated(frfs: Sequence[MeasuredFrf]) -> None:
-    turnings = [_turning(frf.values) for frf in frfs if len(frf.values) >= FEWEST_LINES]
-    if not turnings or float(np.mean(turnings)) <= CLEARLY:
+    counted = [frf for frf in frfs if len(frf.values) >= FEWEST_LINES]
+    turnings = np.array([_turning(frf.values) for frf in counted])
+    if not len(counted):
         return
-    source = frfs[0].source
-    if source.is_conjugated:
-        problem = "with 'conjugated' these FRFs look conjugated: their phase rises through resonances; leave it out"
-    else:
-        problem = "these FRFs look conjugated: their phase rises through resonances, as for exp(-i omega t)"
-        problem += "; give their [[frf]] conjugated = true, or export their complex conjugate"
-    raise FileFormatError(source.path, problem)
+    source = counted[0].source
+    if float(turnings.mean()) > CLEARLY:
+        if source.is_conjugated:
+            problem = "with 'conjugated' these FRFs look conjugated: their phase rises through resonances; leave it out"
+        else:
+            problem = "these FRFs look conjugated: their phase rises through resonances, as for exp(-i omega t)"
+            problem += "; give their [[frf]] conjugated = true, or export their complex conjugate"
+        raise FileFormatError(source.path, problem)
+    against = [
+        str(frf.label) for frf, sense in zip(counted, turnings, strict=True) if sense > SURELY and _resolves(frf)
+    ]
+    if against and (turnings < -SURELY).any():
+        problem = f"{', '.join(against)} looks conjugated beside the other FRFs: its phase rises through resonances"
+        raise FileFormatError(source.path, f"{problem}; export all FRFs by one convention")
+
+
+def _resolves(frf: MeasuredFrf) -> bool:
+    """Tell whether an FRF turns over several lines, not from one to the next."""
+    steps = np.abs(np.imag(frf.values[1:] * np.conj(frf.values[:-1])))
+    return float(steps.sum()) ** 2 > RESOLVED * float(np.sum(steps**2))
 
 
 def _turning(values: ComplexArray) -> float:

@@ -21,6 +21,7 @@ CHANCE = 1e-6  # probability with which a good record is marked
 STEPS = 1.5  # digital steps: a smooth signal leaves a plateau by one
 SIGNIFICANT = 5.0  # standard deviations: 6e-7 of normal values lie beyond
 FEWEST_BEFORE = 16  # samples before the pulse from which a drift can be told
+MOST_MISSING = 0.5  # of the recorded force: where a record lacks more, the error turns the FRF, as poles do
 LOUD = 4.0  # standard deviations of the noise that a sample of the pulse exceeds
 
 

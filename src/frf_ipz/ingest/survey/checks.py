@@ -8,7 +8,7 @@ import numpy as np
 
 from frf_ipz.ingest.signals.clipping import digital_step, is_clipped
 from frf_ipz.ingest.signals.decay import Decay, measure_decay
-from frf_ipz.ingest.signals.faults import find_dropout, find_missing_force, is_settling
+from frf_ipz.ingest.signals.faults import MOST_MISSING, find_dropout, find_missing_force, is_settling
 from frf_ipz.ingest.signals.periods import find_period
 from frf_ipz.ingest.signals.pulses import find_pulse, force_band, pulse_extent
 from frf_ipz.ingest.survey.record_info import RecordInfo
@@ -72,6 +72,8 @@ def check_impact(
         start = min(start, int(pulse.bumps.min()) + start - pulse.peak)
     trigger = max(min(pulse.onset, *(int(bump) for bump in pulse.bumps), len(force) - 1), 0)
     missing_force = find_missing_force(force, pulse) if start <= 0 else (0.0,)
+    recorded = abs(float(np.sum(force[max(start, 0) : stop] - pulse.base)))
+    lacks_most = any(missing_force) and (pulse.peak == 0 or abs(sum(missing_force)) > MOST_MISSING * recorded)
     if offsets is None:
         offsets = tuple(_estimate_offset(response[: max(start, 0)]) for response in responses)
     decays = _measure_decays(test, index.step_s, responses - np.array(offsets)[:, None], trigger)
@@ -98,12 +100,13 @@ def check_impact(
         slowest_mode_hz=slowest.frequency_hz,
         snr_db=snr_db,
         faults=(
-            *_find_late_start(force, pulse, missing_force),
+            *_find_late_start(force, pulse, missing_force, lacks_most=lacks_most),
             *_find_double_hit(pulse, index.step_s),
             *_find_clipping(test, force),
         ),
         channel_faults=_find_bad_channels(test, index.step_s, responses, max(start, 0)),
         missing_force=missing_force,
+        lacks_most=lacks_most,
         remarks=(
             *_find_cut_off_decay(slowest),
             *_find_weak_impact(pulse, snr_db),
@@ -175,9 +178,15 @@ def _find_double_hit(pulse: Pulse, step_s: float) -> tuple[str, ...]:
     return (f"double hit: {100 * pulse.ratios[strongest]:.0f} % of the pulse {1e3 * abs(delay):.3g} ms {side} it",)
 
 
-def _find_late_start(force: FloatArray, pulse: Pulse, missing_force: tuple[float, ...]) -> tuple[str, ...]:
+def _find_late_start(
+    force: FloatArray, pulse: Pulse, missing_force: tuple[float, ...], *, lacks_most: bool
+) -> tuple[str, ...]:
     if not any(missing_force):
         return ()
+    if pulse.peak == 0:
+        return ("begins at the peak of the impact or after it: the force before its first sample is not known",)
+    if lacks_most:
+        return ("begins within the impact, and lacks more of its force than half of what it holds",)
     return (f"begins within the impact, at {100 * (force[0] - pulse.base) / pulse.height:.2g} % of its peak",)
 
 

@@ -66,6 +66,8 @@ class RecordInfo:
         It enters them with all channels, whatever is wrong with them.
     missing_force : tuple of float
         Samples of the force that its record lacks because it begins within the pulse, N.
+    lacks_most : bool
+        Its record begins so late in the pulse that nothing is known of the force.
     noise_scales : tuple of float
         Noise power of each response over that of the other impacts; empty where they cannot be compared.
     period : int
@@ -99,6 +101,7 @@ class RecordInfo:
     used: bool = True
     keeps_channels: bool = False
     missing_force: tuple[float, ...] = (0.0,)
+    lacks_most: bool = False
     noise_scales: tuple[float, ...] = ()
     period: int = 0
 

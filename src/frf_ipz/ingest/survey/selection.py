@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.survey.record_info import RecordInfo
 
+MOST_NAMES = 3  # records that a message names
 SAME_STEP = 1e-3  # relative difference up to which two files have one time step
 
 
@@ -129,7 +130,8 @@ def select_records(records: Sequence[RecordInfo], options: IngestOptions) -> Sel
     Raises
     ------
     InputError
-        If the user drops all records of a DOF, or all of them differ in time step from the rest of the test.
+        If the user drops all records of a DOF, or all of them differ in time step from the rest of the test or lack
+        the force.
     """
     not_dropped = [record for record in records if not is_named(record.name, options.drop)]
     step_s = _usual_step([record.step_s for record in not_dropped or records])
@@ -232,6 +234,14 @@ def _least_bad(
             f"all records at {setup.input_dof} have the time step {candidates[0].step_s:.6g} s, but the others of the "
             f"test have {step_s:.6g} s; export them with one step, or make a test of their own"
         )
+    if all(record.lacks_most for record in usable_records):
+        raise InputError(
+            f"all records at {setup.input_dof} begin at the peak of the impact or after it "
+            f"({', '.join(record.name for record in usable_records[:MOST_NAMES])}"
+            f"{' ...' if len(usable_records) > MOST_NAMES else ''}), so that nothing is known of the force; record "
+            "again with a pre-trigger, which begins some milliseconds before the impact"
+        )
+    usable_records = [record for record in usable_records if not record.lacks_most]
     late_records = [record for record in usable_records if any(record.missing_force) and len(record.faults) == 1]
     if late_records:  # how wrong they are is known
         return [record for record in late_records if record.used_outputs] or late_records
