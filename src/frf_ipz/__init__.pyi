@@ -93,6 +93,8 @@ from .ingest.estimate import estimate_frfs as estimate_frfs
 from .ingest.estimation.frf_files import read_frfs as read_frfs
 from .ingest.frf_estimate import FrfEstimate as FrfEstimate
 from .ingest.options import IngestOptions as IngestOptions
+from .ingest.recorded_signals import RecordedSignals as RecordedSignals
+from .ingest.recorded_signals import read_recordings as read_recordings
 from .modes import ModalParameters as ModalParameters
 from .modes import ModeSet as ModeSet
 from .pairing.pair import pair_roots as pair_roots

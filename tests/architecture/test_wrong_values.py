@@ -115,6 +115,10 @@ def calls():
             {"tolerance_m_per_m": [-1.0, np.nan]},
         ),
         "read_ensemble": ({"path": "x.mat"}, {"path": [Path(__file__)]}),
+        "read_recordings": (
+            {"path": "x.csv"},
+            {"path": [Path(__file__), Path("x.csv"), 3], "sample_rate_hz": [0.0, "fast"], "time_column": [3]},
+        ),
         "read_frfs": (
             {"path": "x.csv"},
             {

@@ -176,8 +176,9 @@ class FrfKeys:
         The file has the time convention exp(-i omega t): its FRFs are the complex conjugate of ours.
     variables : dict of str to str
         What stands where in a file of arrays: ``frequency_hz`` or ``frequency_rad_s``, or ``frequency_step_hz`` with
-        ``frequency_start_hz``, or ``sample_rate_hz`` where the lines go to half of it; ``frf``, or ``real`` and ``imag``, or ``magnitude`` or ``magnitude_db`` with
-        ``phase_deg`` or ``phase_rad``; ``coherence``, ``variance``. Found by names and shapes where it is left out.
+        ``frequency_start_hz``, or ``sample_rate_hz`` where the lines go to half of it; ``frf``, or ``real`` and
+        ``imag``, or ``magnitude`` or ``magnitude_db`` with ``phase_deg`` or ``phase_rad``; ``coherence``, ``variance``.
+        Found by names and shapes where it is left out.
     level : float, optional
         Amplitude of the excitation, N, where the test holds the same FRFs at several: the fit is of the weakest, and
         the others show how its modes move.

@@ -134,7 +134,7 @@ class RecordingFiles:
             _channel_factor(path, channel, dof, file_unit)
             for channel, dof, file_unit in zip(channels, dofs, recording.units[1:], strict=True)
         ]
-        time_check = _UniformTimeCheck(recording)
+        time_check = UniformTimeCheck(recording)
         start_s: float | None = None
         for block in recording.blocks:
             block *= factors  # in place: the block is ours, and copies cost time
@@ -146,8 +146,14 @@ class RecordingFiles:
         time_check.finish()
 
 
-class _UniformTimeCheck:
-    """Refuses a time that is not uniform, block by block, and a recording that is too short."""
+class UniformTimeCheck:
+    """Refuses a time that is not uniform, block by block, and a recording that is too short.
+
+    Parameters
+    ----------
+    recording : RawRecording
+        What is read, for messages.
+    """
 
     def __init__(self, recording: RawRecording) -> None:
         self._path = recording.path
@@ -159,6 +165,18 @@ class _UniformTimeCheck:
         self._median = 0.0
 
     def add(self, time: FloatArray) -> None:
+        """Check the next times.
+
+        Parameters
+        ----------
+        time : (n_rows,) array
+            s.
+
+        Raises
+        ------
+        FileFormatError
+            If a step is not the median one: names the row.
+        """
         steps = np.diff(time, prepend=self._last) if self._n_rows else np.diff(time)
         if self._n_rows == 0 and steps.size:
             self._median = float(np.median(steps))
@@ -177,6 +195,13 @@ class _UniformTimeCheck:
         self._last = time[-1:]
 
     def finish(self) -> None:
+        """Check that there were enough of them.
+
+        Raises
+        ------
+        FileFormatError
+            If there are fewer than 16.
+        """
         if self._n_rows < FEWEST_SAMPLES:
             problem = f"holds {self._n_rows} samples; a recording needs at least {FEWEST_SAMPLES}: is it cut off?"
             raise FileFormatError(self._path, problem)

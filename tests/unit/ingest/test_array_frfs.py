@@ -148,7 +148,7 @@ def test_functions_that_carry_their_axis_in_the_first_column(tmp_path):
     frfs = read(tmp_path / "a.mat", output="1:+z", input="2:+z", variables={"frf": "H1_3"})
     np.testing.assert_allclose(frfs.frequency_hz, LINES_HZ)
     np.testing.assert_allclose(frfs.values[:, 0], FRFS[:, 0, 1])
-    with pytest.raises(InputError, match="several arrays that may be FRFs: 'H1_2'.*'H1_3'"):
+    with pytest.raises(InputError, match=r"several arrays that may be FRFs: 'H1_2'.*'H1_3'"):
         read(tmp_path / "a.mat", output="1:+z", input="2:+z")
 
 
