@@ -78,7 +78,8 @@ ROOT = (
     Column("real_std_rad_s", "float", "rad/s", "standard deviation of the real part"),
     Column("imag_std_rad_s", "float", "rad/s", "standard deviation of the imaginary part"),
 )
-POLE = (Column("pole_id", "int", "", "number of the pole, by ascending frequency"), *ROOT)
+FOUND_AGAIN = Column("found_again", "float", "1", "probability that the mode is found again with half as many lines")
+POLE = (Column("pole_id", "int", "", "number of the pole, by ascending frequency"), *ROOT, FOUND_AGAIN)
 ZERO = (
     Column("zero_id", "int", "", "number of the zero"),
     *LABEL,
@@ -123,6 +124,7 @@ MODE = (
     Column("significance", "float", "1", "what the mode takes off the misfit, over what the BIC demands for it"),
     Column("damping_std_ratio", "float", "1", "standard deviation of the damping over the damping"),
     Column("misfit_level", "float", "1", "misfit at its frequency over noise, median of the FRFs, at least 1"),
+    FOUND_AGAIN,
     Column("quality", "text", "", "good, fair or poor"),
     Column("remarks", "text", "", "why"),
 )
@@ -209,7 +211,9 @@ def pole_table(fit: ModalFit) -> pa.Table:
     """
     count = fit.n_modes
     blocks = pair_blocks(fit.covariance)[:count]
-    return make_table(POLE, {"pole_id": range(1, count + 1), **_roots(fit.model.poles[:count], blocks)})
+    found_again = fit.modes["found_again"] if "found_again" in fit.modes else np.full(count, np.nan)
+    roots = _roots(fit.model.poles[:count], blocks)
+    return make_table(POLE, {"pole_id": range(1, count + 1), **roots, "found_again": found_again})
 
 
 def zero_table(fit: ModalFit) -> pa.Table:

@@ -215,7 +215,7 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
         value_std=value_std(errors, lines.s) * unit,
         stabilization=fitted.start,
         decisions=_decisions(fitted, modes, unconfirmed),
-        modes=mode_table(fit.poles[modes], fit.system.residues()[modes], fitted.goodness, modes, unconfirmed),
+        modes=mode_table(fit.poles[modes], fit.system.residues()[modes], fitted.goodness, modes, halves),
         misfit=misfit_frame.join(of_frfs, on="frf"),
         gain=gains.of_frf,
         channel_gains=gains.table,

@@ -8,12 +8,15 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.identification.results.found_again import found_again
+from frf_ipz.identification.search.split_half import unconfirmed_reasons
 from frf_ipz.modes import modal_assurance, modal_phase_collinearity
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit
+    from frf_ipz.identification.search.split_half import SplitHalf
 
 BANDS = 8  # of the misfit table, of equal width
 GOOD_DAMPING, POOR_DAMPING = 0.05, 0.15  # relative standard deviation of the damping
@@ -25,7 +28,11 @@ CLOSE_MODES = 0.02  # relative distance of two modes whose shapes are compared f
 
 
 def mode_table(
-    poles: ComplexArray, residues: ComplexArray, goodness: GoodnessOfFit, modes: IntArray, doubts: tuple[str, ...]
+    poles: ComplexArray,
+    residues: ComplexArray,
+    goodness: GoodnessOfFit,
+    modes: IntArray,
+    halves: SplitHalf | None,
 ) -> pd.DataFrame:
     """Table of the modes with a quality mark.
 
@@ -39,15 +46,15 @@ def mode_table(
         Of the fit.
     modes : (n_modes,) int array
         Indices of the modes in the goodness.
-    doubts : tuple of str
-        Why a mode is not to be relied on, whatever else; empty where nothing says so.
+    halves : SplitHalf or None
+        The fits of even and of odd lines, where they were made: a mode that does not come up in both is poor.
 
     Returns
     -------
     DataFrame
         One row a mode; `quality` is good, fair or poor, and `remarks` says why.
     """
-    shapes = residues.T
+    shapes, doubts = residues.T, unconfirmed_reasons(halves, modes)
     assurance = modal_assurance(shapes, shapes)
     np.fill_diagonal(assurance, 0.0)
     is_close = np.abs(np.abs(poles)[:, None] / np.abs(poles) - 1) < CLOSE_MODES
@@ -62,6 +69,7 @@ def mode_table(
         "significance": goodness.significance[modes],
         "damping_std_ratio": goodness.damping_std[modes],
         "misfit_level": _level_at(goodness, poles),
+        "found_again": found_again(goodness, halves)[modes],
     }
     remarks = [_remarks(rows, number, float(confused[number])) for number in range(len(poles))]
     quality = [

@@ -49,6 +49,8 @@ class GoodnessOfFit:
         Standard deviation of each damping, relative.
     factor : (n_poles, n_frfs) array
         Level of the misfit at each pole, over that of white noise: what its gains are divided by.
+    drops : (n_poles, n_frfs) array
+        What each pole takes off minus twice the log likelihood of each FRF, over `factor`.
     is_needed : (n_poles,) bool array
         The model is far from the lines, and would be clearly farther without the pole: whatever its significance, which
         suffers from the modes that are still missing.
@@ -61,6 +63,7 @@ class GoodnessOfFit:
     significance: FloatArray
     damping_std: FloatArray
     factor: FloatArray
+    drops: FloatArray
     is_needed: BoolArray
 
 
@@ -105,6 +108,7 @@ def assess_fit(
         significance=over_bic(gains / factor, 2 * len(data.s)),
         damping_std=_damping_std(fit) * np.sqrt(np.median(factor, axis=1)),
         factor=factor,
+        drops=gains / factor,
         is_needed=modes_are_missing & (gains.sum(axis=1) > NEEDED * fit.misfit),
     )
 
@@ -168,11 +172,18 @@ def over_bic(drops: FloatArray, n_numbers: int) -> FloatArray:
     (n_poles,) array
         Above 1 where a pole is asked for.
     """
-    n_frfs = drops.shape[1]
+    return np.asarray(np.max(cumulated_drops(drops) / bic_penalty(drops.shape[1], n_numbers), axis=1, initial=0.0))
+
+
+def cumulated_drops(drops: FloatArray) -> FloatArray:
+    """Give what a pole takes off in the one, two ... FRFs where it takes off most, (n_poles, n_frfs)."""
+    return np.asarray(np.cumsum(-np.sort(-drops, axis=1), axis=1))
+
+
+def bic_penalty(n_frfs: int, n_numbers: float) -> FloatArray:
+    """Give what the BIC demands of a pole that shows in one, two ... FRFs of `n_frfs`, (n_frfs,)."""
     count = np.arange(1, n_frfs + 1)
-    penalty = (2 * count + 2) * np.log(n_numbers) + 2 * count * np.log(n_frfs / count)
-    cumulated = np.cumsum(-np.sort(-drops, axis=1), axis=1)
-    return np.asarray(np.max(cumulated / penalty, axis=1, initial=0.0))
+    return np.asarray((2 * count + 2) * np.log(n_numbers) + 2 * count * np.log(n_frfs / count))
 
 
 def _level_at_poles(data: WeightedLines, poles: ComplexArray, level: FloatArray) -> FloatArray:

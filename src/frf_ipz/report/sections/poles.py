@@ -51,7 +51,7 @@ def build(run: Results) -> Section | None:
 def _mode_table(fit: ModalFit) -> Table:
     poles = fit.model.poles[: fit.n_modes]
     hertz_std, ratio_std = root_deviations(poles, root_covariances(fit)[: fit.n_modes])
-    extra = [name for name in ("mpc", "quality") if name in fit.modes and len(fit.modes) == len(poles)]
+    extra = [name for name in ("mpc", "found_again", "quality") if name in fit.modes and len(fit.modes) == len(poles)]
     rows = []
     for row, pole in enumerate(poles):
         hertz, ratio = float(natural_frequency_hz(pole)), float(damping_ratio(pole))
@@ -62,7 +62,7 @@ def _mode_table(fit: ModalFit) -> Table:
         "pole",
         "frequency, Hz",
         "damping ratio, %",
-        *[name.upper() if name == "mpc" else name for name in extra],
+        *[name.upper() if name == "mpc" else name.replace("_", " ") for name in extra],
     )
     return Table(caption="Modes of the band", columns=columns, rows=rows, file="poles.parquet, modes.parquet")
 
