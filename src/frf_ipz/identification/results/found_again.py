@@ -2,8 +2,9 @@
 
 A mode stays in a fit where it takes more off the misfit than the BIC demands. What it takes off half as many lines
 follows a noncentral chi-square distribution [Abramowitz1972, 26.4.25 to 26.4.28], whose noncentrality the lines of this
-fit tell, as well as its own drop is known. A mode of uncertain damping must take off more, as in the selection. Misfits that are larger than the noise count as noise, as in the selection. Where the even and the odd lines
-have been fitted by themselves, each of the two is an observation beside that expectation.
+fit tell, as well as its own drop is known. As in the selection, a mode of uncertain damping must take off more, and
+misfits that are larger than the noise count as noise. Where the even and the odd lines have been fitted by themselves,
+each of the two is an observation beside that expectation.
 
 [Abramowitz1972] M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 10th printing, 1972.
 """
