@@ -1,6 +1,7 @@
 """What the page's script draws from: pictures as JSON, every array once for the whole page.
 
-Arrays are single-precision bytes in base64.
+Arrays are single-precision bytes in base64. On a page of hundreds of FRFs they are numbers of 16 bits: lines of an even
+spacing are then exact, and curves good to less than a screen shows.
 """
 
 from __future__ import annotations
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
     from frf_ipz.runs.results import Results
 
 LEAST_PACKED = 24  # shorter arrays are written as numbers
+MANY_FRFS = 100  # above which the page holds numbers of 16 bits
+STEPS = 65534  # between the least and the largest number of 16 bits; one more stands for no number
+ON_A_LINE = 1e-3  # of their spacing, by which printed frequencies are off
+DECADES = 2.0  # of positive numbers above which their logarithm is spaced evenly
 DIGITS = 8  # of numbers that are written: single precision, as the packed ones
 
 
@@ -41,7 +46,7 @@ def page_data(run: Results, sections: Sequence[Section]) -> dict[str, object]:
     dict
         What JSON can hold.
     """
-    packer = Packer()
+    packer = Packer(is_short=run.frfs is not None and run.frfs.n_frfs > MANY_FRFS)
     pictures = packed_pictures(sections, packer)
     frequencies = [] if run.frfs is None else run.frfs.frequency_hz[run.frfs.frequency_hz > 0][:1].tolist()
     return {
@@ -79,11 +84,14 @@ class Packer:
 
     Parameters
     ----------
-    arrays : list of str
-        Bytes of each array, base64.
+    arrays : list of str or dict
+        Bytes of each array, base64; of one of 16 bits with ``low``, ``step`` and ``log``, see `short_numbers`.
+    is_short : bool
+        Write numbers of 16 bits.
     """
 
-    arrays: list[str] = field(default_factory=list)
+    arrays: list[str | dict[str, Any]] = field(default_factory=list)
+    is_short: bool = False
     _known: dict[bytes, int] = field(default_factory=dict)
 
     def pack(self, value: Any) -> Any:  # noqa: ANN401  trees of plain values and arrays
@@ -113,8 +121,46 @@ class Packer:
         data = np.ascontiguousarray(array, "<f4").tobytes()
         if data not in self._known:
             self._known[data] = len(self.arrays)
-            self.arrays.append(base64.b64encode(data).decode("ascii"))
+            self.arrays.append(short_numbers(array) if self.is_short else base64.b64encode(data).decode("ascii"))
         return self._known[data]
+
+
+def short_numbers(array: np.ndarray[Any, Any]) -> dict[str, Any]:
+    """Write an array with 16 bits a number: ``low + step k``, or the exponential of that.
+
+    Parameters
+    ----------
+    array : (n,) array
+        Any numbers.
+
+    Returns
+    -------
+    dict
+        ``bytes`` in base64, ``low``, ``step``, and ``log`` where the logarithm is spaced evenly.
+
+    Examples
+    --------
+    >>> short = short_numbers(np.array([10.0, 10.5, 12.0]))
+    >>> short["low"], short["step"], np.frombuffer(base64.b64decode(short["bytes"]), "<u2").tolist()
+    (10.0, 0.5, [0, 1, 4])
+    """
+    values = np.asarray(array, float)
+    known = values[np.isfinite(values)]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+    is_log = low > 0 and np.log10(high / low) > DECADES
+    spacing = np.diff(known)
+    step = float(spacing.min()) if len(spacing) else 0.0
+    counts = (known - low) / step if step > 0 else np.zeros(1)
+    if step > 0 and counts[-1] <= STEPS and np.allclose(counts, np.round(counts), rtol=0, atol=ON_A_LINE):
+        step, is_log = (high - low) / float(np.round(counts[-1])), False
+    else:
+        low, high = (float(np.log(low)), float(np.log(high))) if is_log else (low, high)
+        step = (high - low) / STEPS or 1.0
+    with np.errstate(invalid="ignore"):  # NaN stays NaN, and is told apart below
+        scaled = (np.log(values) if is_log else values) - low
+    whole = np.where(np.isfinite(scaled), np.round(scaled / step), STEPS + 1)
+    data = base64.b64encode(whole.astype("<u2").tobytes()).decode("ascii")
+    return {"bytes": data, "low": low, "step": step, **({"log": True} if is_log else {})}
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401  a leaf of such a tree

@@ -43,8 +43,8 @@ Trace: TypeAlias = "dict[str, Any]"
 
 GAP = 0.06  # of the height, between panels
 GAP_BESIDE = 0.08  # of the width
-POINTS = 44_000  # of one kind of curve on the whole page: keeps a page of 100 FRFs below 10 MB
-BINS = (150, 1200)  # of one curve: the fewest that still look like it, and as many as a screen has columns
+POINTS = 44_000  # of one kind of curve on the whole page: keeps a page of 900 FRFs below 10 MB
+BINS = (40, 1200)  # of one curve: the fewest that still have its peaks and notches, and as many as a screen has columns
 LOGARITHMIC = 0.35  # of the bins are spread evenly over the logarithm of the frequency, the others over the frequency
 MOST_CELLS = 240  # of a map in which the numbers are written
 BESIDE_NAMES_PX = {"x": 30, "y": 10}  # from names of categories to the title of their axis

@@ -30,9 +30,16 @@
 
   function array(index) {
     if (!decoded[index]) {
-      const text = atob(page.arrays[index]);
-      const bytes = Uint8Array.from(text, (c) => c.charCodeAt(0));
-      decoded[index] = new Float32Array(bytes.buffer);
+      const packed = page.arrays[index];
+      const text = atob(packed.bytes || packed);
+      const buffer = Uint8Array.from(text, (c) => c.charCodeAt(0)).buffer;
+      if (packed.bytes) {
+        // numbers of 16 bits, evenly spaced, or their logarithms; the largest stands for none
+        const value = (k) => (k === 65535 ? NaN : packed.low + packed.step * k);
+        decoded[index] = Float32Array.from(new Uint16Array(buffer), packed.log ? (k) => Math.exp(value(k)) : value);
+      } else {
+        decoded[index] = new Float32Array(buffer);
+      }
     }
     return decoded[index];
   }
