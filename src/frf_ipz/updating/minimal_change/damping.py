@@ -33,8 +33,7 @@ SMALLEST_NOISE = 1e-4  # relative standard deviation of a real part: none is mea
 NO_DAMPING = 1e-3  # of the typical rate: a model with less states no damping for that mode
 POLE_SLACK = 1e-3  # relative standard deviation of a pole's real part that no damping matrix explains
 ZERO_SLACK = 0.02  # the same of a zero, which depends on mode shapes too, and these are not known better
-UNFELT = 0.05  # of a target's deviation: what all couplings together move it by that are left out
-TARGETS_AT_ONCE = 512
+MOST_COUPLED_MODES = 48  # the lowest: as many as may change each other's stiffness; higher ones lie far above the band
 INDEFINITE = 1e-9  # part of the largest rate below which a negative eigenvalue is rounding
 
 
@@ -66,7 +65,7 @@ class DampingPhase:
         Sizes to which errors are relative, rad/s.
     noise : TargetNoise
         Covariance of the targets over their sizes.
-    pairs : pair of (r (r - 1) / 2,) int arrays
+    pairs : pair of (n_couplings,) int arrays
         Rows and columns of the couplings.
     """
 
@@ -246,26 +245,6 @@ def _by_coupling(x: ComplexArray, y: ComplexArray, row: IntArray, column: IntArr
     return np.asarray(result)
 
 
-def _felt_couplings(phase: DampingPhase, tracked: TrackedRoots, *, std: float) -> tuple[IntArray, IntArray]:
-    """Couplings of modes that the targets feel: the prior of all others moves each by next to nothing of its noise."""
-    row, column = phase.pairs
-    couplings = np.sqrt(phase.rates[row] * phase.rates[column])
-    noise = np.sqrt(phase.noise.variance + phase.slack**2)
-    largest = np.zeros(len(row))
-    for indices, roots in tracked.groups:
-        for first in range(0, len(indices), TARGETS_AT_ONCE):
-            some = roots.take(np.arange(first, min(first + TARGETS_AT_ONCE, len(indices))))
-            x, y = some.right_vectors, some.left_vectors * (some.values / some.slope)
-            targets = indices[first : first + TARGETS_AT_ONCE]
-            moved = _by_coupling(x, y, row, column) / (phase.sizes * noise)[targets, None]
-            largest = np.maximum(largest, np.abs(moved).max(axis=0))
-    largest *= std * couplings
-    order = np.argsort(largest)
-    unfelt = order[np.cumsum(largest[order] ** 2) < UNFELT**2]
-    kept = np.setdiff1d(np.arange(len(row)), unfelt)
-    return row[kept], column[kept]
-
-
 def damping_phase(
     basis: ParameterBasis,
     inner: ModalFrame,
@@ -312,25 +291,21 @@ def damping_phase(
     np.fill_diagonal(shape, 1.0)
     extra, terms = _extra_parameters(basis, inner, dashpots)
     sizes = np.maximum(np.abs(values.real), SMALL_DAMPING * typical_ratio * np.abs(values))
-    phase = DampingPhase(
+    pairs = np.triu_indices(min(len(rates), MOST_COUPLED_MODES), 1)
+    return DampingPhase(
         eigenvalues=inner.eigenvalues,
         rates=rates,
         shape=shape,
         dashpots=dashpots,
         extra=extra,
-        terms=(),
+        terms=_prior_terms(len(rates), len(pairs[0]), len(extra), terms),
         undamped=nominal_roots(target_roots, np.eye(len(rates)), np.diag(inner.eigenvalues), undamped),
         target_roots=target_roots,
         targets=-values.real,
         sizes=sizes,
-        pairs=np.triu_indices(len(rates), 1),
+        pairs=pairs,
         noise=noise.over(sizes).plus(np.full(len(values), SMALLEST_NOISE**2)),
     )
-    order = len(rates)
-    nominal_damping = shape * np.sqrt(rates[:, None] * rates) + dashpots
-    tracked = with_damping(target_roots, phase.undamped, np.eye(order), nominal_damping, np.diag(inner.eigenvalues))
-    pairs = _felt_couplings(phase, tracked, std=COUPLING_STD)
-    return replace(phase, pairs=pairs, terms=_prior_terms(order, len(pairs[0]), len(extra), terms))
 
 
 def _extra_parameters(
