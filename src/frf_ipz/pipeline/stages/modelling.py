@@ -162,8 +162,8 @@ def update(
     InputError
         If the parameters are to be those of a diagnosis that is not applied.
     """
-    options, stated = runner.inputs.options.update, runner.inputs.options.diagnose
-    tolerance = stated.position_tolerance_m_per_m if corrected_by else 0.0
+    options = runner.inputs.options.update
+    tolerance = runner.inputs.options.diagnose.position_tolerance_m_per_m
     sensors = unweighed_sensors(runner.inputs.test, modal_fit.labels)
     nominal = runner.inputs.fe_model
     measured = _once(dof for label in modal_fit.labels for dof in (label.output_dof, label.input_dof))
