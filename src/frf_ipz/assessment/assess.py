@@ -19,7 +19,7 @@ from frf_ipz.fe.eigen import solve_modes
 
 if TYPE_CHECKING:
     from frf_ipz.assessment.assessment import LikelyCause
-    from frf_ipz.assessment.causes.modal_comparison import MeasuredModes
+    from frf_ipz.assessment.causes.modal_comparison import ComputedModes, MeasuredModes
     from frf_ipz.assessment.evidence import Evidence
     from frf_ipz.frf import FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
@@ -74,6 +74,7 @@ def assess(evidence: Evidence) -> Assessment:
         evidence.frfs,
         evidence.fit,
         evidence.fe_model,
+        explained_model=evidence.explained_model,
         impacts=evidence.impacts,
         is_recorded=evidence.is_recorded,
         test_file=evidence.test_file,
@@ -88,6 +89,7 @@ def likely_cause(
     fit: ModalFit,
     fe_model: StructuralModel,
     *,
+    explained_model: StructuralModel | None = None,
     impacts: tuple[Trace, ...] = (),
     is_recorded: bool,
     test_file: str,
@@ -103,6 +105,8 @@ def likely_cause(
         The fitted model.
     fe_model : StructuralModel
         As the user handed it in.
+    explained_model : StructuralModel, optional
+        The FE model with what a diagnosis found, where that explains the measurement.
     impacts : tuple of Trace
         Forces and responses of a hammer's impacts; empty for other tests.
     is_recorded : bool
@@ -125,7 +129,8 @@ def likely_cause(
     )
     if situation is None:
         return None
-    named = find_likely_cause(situation)
+    explained = None if explained_model is None else _modes(explained_model, situation.measured)
+    named = find_likely_cause(situation, explained)
     return find_inverted_columns(frfs, situation) if named is None and is_recorded and not impacts else named
 
 
@@ -150,16 +155,23 @@ def compare_modes(
     Situation or None
         None where the model has no modes that can be computed.
     """
-    n_modes = min(2 * len(measured.frequency_hz) + MODES_BEYOND, len(model.dofs))
-    try:
-        modes = solve_modes(model, n_modes=n_modes)
-    except NumericalError:
+    computed = _modes(model, measured)
+    if computed is None:
         return None
     return Situation(
         measured=measured,
-        computed=computed_modes(modes),
+        computed=computed,
         model=model,
         test_file=test_file,
         model_file=model_file,
         is_recorded=is_recorded,
     )
+
+
+def _modes(model: StructuralModel, measured: MeasuredModes) -> ComputedModes | None:
+    """Modes of a model that may be among the measured ones; None where they cannot be computed."""
+    n_modes = min(2 * len(measured.frequency_hz) + MODES_BEYOND, len(model.dofs))
+    try:
+        return computed_modes(solve_modes(model, n_modes=n_modes))
+    except NumericalError:
+        return None

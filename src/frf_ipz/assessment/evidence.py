@@ -47,6 +47,8 @@ class Evidence(MeasuredPoints):
         What the FE model left out; None where it was not looked for.
     with_causes : Prediction, optional
         Of a model that has what the diagnosis found.
+    explained_model : StructuralModel, optional
+        The FE model with what the diagnosis found, where that explains the measurement.
     is_corrected : bool
         What the diagnosis found is in the model that predicts.
     impacts : tuple of Trace
@@ -63,6 +65,7 @@ class Evidence(MeasuredPoints):
     reference: FrfSet | None = None
     diagnosis: Diagnosis | None = None
     with_causes: Prediction | None = None
+    explained_model: StructuralModel | None = None
     is_corrected: bool = False
     impacts: tuple[Trace, ...] = ()
     is_recorded: bool = False

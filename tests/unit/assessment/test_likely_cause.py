@@ -49,6 +49,36 @@ def fit():
     return frf_ipz.fit_modes(measure())
 
 
+@pytest.fixture(scope="module")
+def heavier():
+    """A machine with a lump of 20 g near its clamp, and what was measured on it."""
+    machine = frf_ipz.make_beam(**BEAM, point_mass=[frf_ipz.BeamPointMass(node=6, mass_kg=0.02)])
+    values = frf_ipz.compute_frfs(machine, FRF, 2j * np.pi * LINES)
+    variance = np.tile(NOISE**2 * np.mean(np.abs(values) ** 2, axis=0), (len(LINES), 1))
+    frfs = frf_ipz.FrfSet(
+        frequency_hz=LINES,
+        values=values,
+        labels=FRF,
+        variance=variance,
+        coherence=np.full(values.shape, np.nan),
+        averages=np.zeros(len(FRF), int),
+    )
+    return machine, frfs, frf_ipz.fit_modes(frfs)
+
+
+@pytest.mark.parametrize("changed", [{}, {"youngs_modulus_Pa": 210e9}])
+def test_what_a_diagnosis_found_competes_with_mistakes(heavier, changed):
+    """A lump looks like a sensor elsewhere until it is found; a wrong modulus stays one, whatever was found."""
+    machine, frfs, fit = heavier
+    model = frf_ipz.make_beam(**{**BEAM, **changed})
+    files = {"is_recorded": True, "test_file": "test.toml", "model_file": "model.toml"}
+    alone = likely_cause(frfs, fit, model, **files)
+    assert alone is not None
+    explained = machine if not changed else model
+    weighed = likely_cause(frfs, fit, model, explained_model=explained, **files)
+    assert weighed is None if not changed else weighed == alone
+
+
 def cause_of(fit, *, labels=None, gain=1.0, frequency_factor=1.0, **model):
     """Look for the cause where labels, gains or the model are not what they should be."""
     measured = measured_modes(fit)

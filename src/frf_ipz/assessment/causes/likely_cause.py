@@ -1,11 +1,13 @@
 """The mistake that most likely explains a mismatch of measured and computed modes.
 
 Every kind of mistake, that there is none, and that it is something else have the same probability beforehand, which the
-causes of a kind share. A new kind is one more function in `KINDS`.
+causes of a kind share. What a diagnosis found competes with them on the same evidence, as a kind of its own: the modes
+of the model with that in it. A new kind is one more function in `KINDS`.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +22,7 @@ from frf_ipz.assessment.causes.modal_comparison import unrelated_log_likelihood
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.assessment.causes.cause import FindCauses
+    from frf_ipz.assessment.causes.modal_comparison import ComputedModes
 
 KINDS: tuple[FindCauses, ...] = (
     gains.of_all_outputs,
@@ -40,13 +43,15 @@ MORE_LIKELY_THAN_NOT = 0.5
 NEGLIGIBLE = 40.0  # of a log evidence, below the best: a million causes so unlikely add nothing to a probability
 
 
-def find_likely_cause(situation: Situation) -> LikelyCause | None:
+def find_likely_cause(situation: Situation, explained: ComputedModes | None = None) -> LikelyCause | None:
     """Say what most likely has to be corrected.
 
     Parameters
     ----------
     situation : Situation
         Measurement and model.
+    explained : ComputedModes, optional
+        Those of the model with what a diagnosis found, where that explains the measurement.
 
     Returns
     -------
@@ -57,14 +62,14 @@ def find_likely_cause(situation: Situation) -> LikelyCause | None:
         return None
     causes = [cause for kind in KINDS for cause in kind(situation)]
     nothing = log_evidence(NO_MISTAKE, situation)
-    something_else = unrelated_log_likelihood(situation.measured)
-    logs = np.array([nothing, something_else, *_log_evidences(causes, situation, max(nothing, something_else))])
-    probability = np.exp(logs - logsumexp(logs))
-    if probability[2:].sum() <= MORE_LIKELY_THAN_NOT:
+    others = [nothing, unrelated_log_likelihood(situation.measured)]
+    if explained is not None:
+        others.append(log_evidence(replace(NO_MISTAKE, computed=explained), situation))
+    logs = np.array([*others, *_log_evidences(causes, situation, max(others))])
+    probability = np.exp(logs - logsumexp(logs))[len(others) :]
+    if probability.sum() <= MORE_LIKELY_THAN_NOT or not explains(causes[int(np.argmax(probability))], situation):
         return None
-    if not explains(causes[int(np.argmax(probability[2:]))], situation):
-        return None
-    return _worded(causes, probability[2:])
+    return _worded(causes, probability)
 
 
 def _log_evidences(causes: list[Cause], situation: Situation, best: float) -> FloatArray:

@@ -206,17 +206,24 @@ def own_band(evidence: Evidence) -> Iterator[Check]:
     if not np.isfinite(share):
         return
     worst = int(np.argmin(np.mean(inside, axis=0)))
-    narrow = share < INSIDE
+    is_felt = evidence.decibels(evidence.updated) > SIXTH * GAIN_MARGIN_DB  # False where an FRF is not heard
+    outside = float(np.mean((~inside & is_felt)[evidence.is_heard]))
+    verdict = judge(outside, 1 - INSIDE, 1 - MOSTLY_OUTSIDE)
     says = f"the 90 % band of the updated model holds {share:.0%} of the lines of the FRFs that were measured"
+    if verdict is not Verdict.USABLE:
+        says += ", so at the points of interest it is too narrow too"
+    elif share < INSIDE:
+        says += f"; on {1 - share - outside:.0%} it misses by less than {SIXTH * GAIN_MARGIN_DB:g} dB"
+        says += ", which is nothing to a controller"
     yield Check(
         name="measured FRFs in the band",
-        verdict=judge(1 - share, 1 - INSIDE, 1 - MOSTLY_OUTSIDE),
+        verdict=verdict,
         figure=share,
         limit=INSIDE,
         unit="1",
         where=str(evidence.frfs.labels[worst]),
-        says=says + (", so at the points of interest it is too narrow too" if narrow else ""),
-        advice="something is missing in the model: frf-ipz diagnose" if narrow else "",
+        says=says,
+        advice="" if verdict is Verdict.USABLE else "something is missing in the model: frf-ipz diagnose",
     )
 
 

@@ -1,4 +1,8 @@
-"""Measured modes and zeros that the model has, with the likeness of their shapes."""
+"""Measured modes and zeros that the model has, and what those cost that it lacks.
+
+A mode without a counterpart counts by what the model misses there. Where the model meets every measured FRF at the
+frequency of that mode to within what a controller does not feel, the mode hardly shows, or is a false one of the fit.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.assessment.assessment import Check, Verdict
+from frf_ipz.assessment.checks.agreement import GAIN_MARGIN_DB, SIXTH
+from frf_ipz.assessment.deviations import worst_median
 from frf_ipz.pairing.pairs import PairVerdict
 
 if TYPE_CHECKING:
@@ -33,19 +39,26 @@ def modes(evidence: Evidence) -> Iterator[Check]:
     count, missing = evidence.pairs.count("pole"), _missing(evidence, "pole")
     if not count.measured:
         return
+    off_db = {row.measured: _off_at_mode(evidence, row.measured_value) for row in missing}
+    worst = max(off_db.values(), default=0.0)
+    felt = [row for row in missing if off_db[row.measured] > SIXTH * GAIN_MARGIN_DB]
     verdict = Verdict.USABLE
+    if felt:
+        is_other = len(felt) > MOST_MISSING * (count.paired + len(felt))
+        verdict = Verdict.NOT_USABLE if is_other else Verdict.WITH_CARE
+    says = count.text
     if missing:
-        verdict = Verdict.NOT_USABLE if 1 - count.share > MOST_MISSING else Verdict.WITH_CARE
-    where = ", ".join(f"{abs(row.measured_value) / (2 * np.pi):.4g}" for row in missing)
+        says += f"; missing: {_frequencies(missing)}, where the model is off by up to {worst:.2g} dB"
+        says += "" if felt else f" all the same: less than {SIXTH * GAIN_MARGIN_DB:g} dB is nothing to a controller"
     yield Check(
         name="modes with a counterpart",
         verdict=verdict,
         figure=count.share,
         limit=1.0,
         unit="1",
-        where=f"{where} Hz" if missing else "",
-        says=count.text + (f"; missing: {where} Hz" if missing else ""),
-        advice="look for what the model leaves out, or whether such a mode is false" if missing else "",
+        where=_frequencies(felt or missing),
+        says=says,
+        advice="look for what the model leaves out, or whether such a mode is false" if felt else "",
     )
 
 
@@ -76,6 +89,18 @@ def zeros(evidence: Evidence) -> Iterator[Check]:
         says=count.text,
         advice="zeros depend on where sensors and excitation are: check the dofs of the test" if many else "",
     )
+
+
+def _off_at_mode(evidence: Evidence, pole: complex) -> float:
+    """How far the model is from the FRF that it meets worst, in the median over the half-power band of a mode, dB."""
+    distance = np.abs(2 * np.pi * evidence.frfs.frequency_hz[evidence.lines] - abs(pole.imag))
+    near = distance <= max(-pole.real, distance.min(initial=np.inf))
+    off, frf = worst_median(evidence.decibels(evidence.updated)[near])
+    return off if frf >= 0 else 0.0
+
+
+def _frequencies(rows: list[Pair]) -> str:
+    return ", ".join(f"{abs(row.measured_value) / (2 * np.pi):.4g}" for row in rows) + " Hz" * bool(rows)
 
 
 def _missing(evidence: Evidence, kind: str) -> list[Pair]:

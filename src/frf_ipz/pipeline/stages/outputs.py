@@ -10,6 +10,7 @@ import numpy as np
 
 from frf_ipz.assessment.assess import assess as judge_run
 from frf_ipz.assessment.evidence import Evidence
+from frf_ipz.diagnosis.apply import correct_model
 from frf_ipz.errors import InputError
 from frf_ipz.export import run_tables as tables
 from frf_ipz.export.modal_files import write_frfs, write_modes
@@ -19,6 +20,7 @@ from frf_ipz.export.state_space_files import write_ensemble, write_state_space, 
 from frf_ipz.export.uncertainty import estimate_uncertainty_weights
 from frf_ipz.frf import FrfSet
 from frf_ipz.pipeline.stages.delays import known_delays
+from frf_ipz.pipeline.stages.mismatch import effects_of
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.rational import without_window
 from frf_ipz.report.page import write_report
@@ -142,6 +144,7 @@ def assess(
                 reference=inputs.reference,
                 diagnosis=diagnosis,
                 with_causes=with_causes,
+                explained_model=_explained_model(runner, fe_model, diagnosis),
                 is_corrected=inputs.options.diagnose.apply,
                 impacts=traces if inputs.test.kind == "hammer" else (),
                 **places,
@@ -150,6 +153,17 @@ def assess(
     )
     runner.store.manifest["assessment"] = assessment.to_json()
     return assessment
+
+
+def _explained_model(
+    runner: StageRunner, fe_model: StructuralModel, diagnosis: Diagnosis | None
+) -> StructuralModel | None:
+    """FE model with what was found; None where that does not explain the measurement, or is in the model already."""
+    if diagnosis is None or not (diagnosis.findings and diagnosis.is_explained):
+        return None
+    if runner.inputs.options.diagnose.apply:
+        return None
+    return correct_model(diagnosis, fe_model, effects=effects_of(runner))
 
 
 def export(
