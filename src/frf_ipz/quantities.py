@@ -73,6 +73,11 @@ class FrfQuantity(Enum):
 
 
 RESPONSES = ("displacement", "velocity", "acceleration")
+RECIPROCALS = {  # force per response, and what it is the reciprocal of
+    "dynamic_stiffness": FrfQuantity.RECEPTANCE,
+    "impedance": FrfQuantity.MOBILITY,
+    "apparent_mass": FrfQuantity.ACCELERANCE,
+}
 
 
 def as_quantity(quantity: FrfQuantity | str) -> FrfQuantity:

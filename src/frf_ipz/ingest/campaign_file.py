@@ -26,7 +26,7 @@ from frf_ipz.ingest.formats.recording import TableKeys
 from frf_ipz.ingest.formats.registry import read_frf_file, read_modes_file
 from frf_ipz.ingest.units import sensitivity_factor, unit_factor
 from frf_ipz.option_types import Count, CountOrNone, Day, NotNegative, Positive, Ratio
-from frf_ipz.quantities import FrfQuantity
+from frf_ipz.quantities import RECIPROCALS, FrfQuantity
 from frf_ipz.toml_files import STRICT, read_toml
 
 if TYPE_CHECKING:
@@ -158,7 +158,8 @@ class FrfKeys:
     file : str
         Its path.
     quantity : str
-        Displacement, velocity or acceleration over force.
+        Displacement, velocity or acceleration over force; or force over one of them, whose reciprocals are taken. The
+        output is where the motion was measured, and the input where the force acts, in both.
     unit : str, optional
         Of the values; SI where it is left out and the file does not say.
     output_dof, input_dof : str or tuple of str, optional
@@ -187,7 +188,7 @@ class FrfKeys:
     __pydantic_config__ = STRICT
 
     file: str
-    quantity: Literal["receptance", "mobility", "accelerance"]
+    quantity: Literal["receptance", "mobility", "accelerance", "dynamic_stiffness", "impedance", "apparent_mass"]
     unit: str | None = None
     output_dof: str | tuple[str, ...] | None = None
     input_dof: str | tuple[str, ...] | None = None
@@ -519,7 +520,8 @@ def _read_source(path: Path, keys: FrfKeys) -> FrfSource:
     where = f"[[frf]] '{keys.file}'"
     return FrfSource(
         path=path.parent / keys.file,
-        quantity=FrfQuantity(keys.quantity),
+        quantity=RECIPROCALS.get(keys.quantity) or FrfQuantity(keys.quantity),
+        is_reciprocal=keys.quantity in RECIPROCALS,
         unit=keys.unit or "",
         output_dofs=_parse_dofs(path, keys.output_dof, where),
         input_dofs=_parse_dofs(path, keys.input_dof, where),

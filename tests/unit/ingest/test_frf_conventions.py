@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+import data_sets
 import frf_ipz
 from frf_ipz.errors import InputError
 from synthetic_campaign import Structure
@@ -139,3 +140,43 @@ def test_files_of_different_resolution_share_the_coarse_lines(tmp_path):
     np.testing.assert_array_equal(result.frfs.frequency_hz, LINES_HZ)
     np.testing.assert_array_equal(result.frfs.values[:, 0], fine[::4, 0])
     assert "301 of up to 1201 lines are used: those that all FRFs share; b.csv has more" in result.warnings
+
+
+@pytest.mark.parametrize(
+    ("stated", "quantity"), [("dynamic_stiffness", "receptance"), ("apparent_mass", "accelerance")]
+)
+def test_force_over_response_is_turned_round(tmp_path, stated, quantity):
+    hertz = np.arange(0.0, 200.0)
+    omega = 2 * np.pi * hertz
+    receptance = 1.0 / (2.0 * (2 * np.pi * 60.0) ** 2 * (1 + 0.02j) - 2.0 * omega**2)
+    truth = receptance if quantity == "receptance" else -(omega**2) * receptance
+    values = np.zeros(len(hertz), complex)
+    np.divide(1.0, truth, out=values, where=truth != 0)
+    rows = [
+        f"{f!r},2:+z,1:+z,{v.real!r},{v.imag!r}" for f, v in zip(hertz.tolist(), (values / 1e3).tolist(), strict=True)
+    ]
+    (tmp_path / "a.csv").write_text("\n".join(["frequency_hz,output_dof,input_dof,real,imag", *rows]) + "\n")
+    unit = "kN/m" if quantity == "receptance" else "kN/(m/s^2)"
+    frfs = frf_ipz.read_frfs(tmp_path / "a.csv", quantity=stated, unit=unit)
+    assert frfs.labels[0].quantity.value == quantity
+    expected = truth[np.searchsorted(hertz, frfs.frequency_hz)]
+    np.testing.assert_allclose(frfs.values[:, 0], expected, rtol=1e-12)
+    assert len(frfs.frequency_hz) == (200 if quantity == "receptance" else 199)  # no mass at rest
+
+
+def test_dynamic_stiffness_of_a_universal_file_says_where_the_motion_is(tmp_path):
+    hertz = np.arange(1.0, 200.0)
+    stiffness = 5e5 * (1 + 0.02j) - 2.0 * (2 * np.pi * hertz) ** 2
+    axes = ((18, "Frequency", "Hz"), (13, "Force", "N"), (8, "Displacement", "mm"))
+    ends = "      NONE         7   3       NONE         9   3"
+    (tmp_path / "a.uff").write_text(data_sets.data_set(stiffness / 1e3, axes=axes, start=1.0, ends=ends))
+    frfs = frf_ipz.read_frfs(tmp_path / "a.uff", quantity="dynamic_stiffness")
+    assert str(frfs.labels[0]) == "9:+z / 7:+z"
+    np.testing.assert_allclose(frfs.values[:, 0], 1.0 / stiffness, rtol=1e-10)
+
+
+def test_a_force_over_a_response_that_is_zero_has_no_reciprocal(tmp_path):
+    rows = [f"{line},2:+z,1:+z,{1.0 if line != 7 else 0.0},{0.1 if line != 7 else 0.0}" for line in range(1, 30)]
+    (tmp_path / "a.csv").write_text("\n".join(["frequency_hz,output_dof,input_dof,real,imag", *rows]) + "\n")
+    with pytest.raises(InputError, match="is zero at 7 Hz, and has no reciprocal there"):
+        frf_ipz.read_frfs(tmp_path / "a.csv", quantity="impedance")

@@ -19,7 +19,7 @@ from frf_ipz.ingest.frf_estimate import FrfEstimate
 from frf_ipz.ingest.signals.windows import correlated_lines
 from frf_ipz.ingest.units import frf_factor
 from frf_ipz.progress import silent
-from frf_ipz.quantities import FrfQuantity, as_quantity
+from frf_ipz.quantities import RECIPROCALS, FrfQuantity, as_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -155,7 +155,8 @@ def read_frfs(
     path : str or Path
         The file.
     quantity : FrfQuantity or str
-        What its FRFs are: ``accelerance``, ``mobility`` or ``receptance``.
+        What its FRFs are: ``accelerance``, ``mobility`` or ``receptance``; or force over response, whose reciprocals
+        are taken: ``apparent_mass``, ``impedance`` or ``dynamic_stiffness``.
     unit : str
         Unit of the values, such as ``"g/N"``; what the file states where it is left out, and else SI.
     output, input : Dof or str, or a sequence of them, optional
@@ -199,7 +200,8 @@ def read_frfs(
     """
     source = FrfSource(
         path=require_file(path),
-        quantity=as_quantity(quantity),
+        quantity=RECIPROCALS.get(str(quantity)) or as_quantity(quantity),
+        is_reciprocal=str(quantity) in RECIPROCALS,
         unit=unit,
         output_dofs=_as_dofs(output),
         input_dofs=_as_dofs(input),

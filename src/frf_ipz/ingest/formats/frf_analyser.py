@@ -65,7 +65,8 @@ class _AnalyserText:
             raise FileFormatError(
                 source.path, "does not say what its columns are; write columns = [...] in its [[frf]]"
             )
-        unit = found.unit if found.quantity is source.quantity else ""
+        is_known = found.quantity is source.quantity and not source.is_reciprocal
+        unit = found.unit if is_known else ""
         frfs = frf_text.FORMAT.read(replace(source, columns=found.columns))
         about = f"{source.path.name}: its columns are {', '.join(found.columns)}"
         return tuple(replace(frf, source=source, unit=unit, notes=(*frf.notes, about)) for frf in frfs)

@@ -57,7 +57,32 @@ def read_frf_source(source: FrfSource) -> tuple[MeasuredFrf, ...]:
 
 
 def _as_stated(frf: MeasuredFrf) -> MeasuredFrf:
+    frf = _reciprocal(frf) if frf.source.is_reciprocal else frf
     return replace(frf, values=np.conj(frf.values)) if frf.source.is_conjugated else frf
+
+
+def _reciprocal(frf: MeasuredFrf) -> MeasuredFrf:
+    """Take the FRF of a force over a response: the response over the force, where no other force acts."""
+    is_zero = frf.values == 0.0
+    at_rest = is_zero & (frf.frequency_hz == 0.0)  # a free structure has none there
+    if (is_zero & ~at_rest).any():
+        hertz = frf.frequency_hz[is_zero & ~at_rest][0]
+        problem = f"the force over the response of {frf.label} is zero at {hertz:g} Hz, and has no reciprocal there"
+        raise FileFormatError(frf.source.path, f"{problem}; correct the file")
+    name = f"{frf.source.path.name}, {frf.label}"
+    note = f"{name}: the reciprocal of force over response, which is the FRF where a single force acts"
+    if at_rest.any():
+        frf = _select(frf, ~at_rest, f"{name}: zero at 0 Hz: left out")
+    unit = f"1/({frf.unit})" if frf.unit else ""
+    source = replace(frf.source, unit=f"1/({frf.source.unit})" if frf.source.unit else "", is_reciprocal=False)
+    return replace(
+        frf,
+        source=source,
+        values=1.0 / frf.values,
+        variance=None if frf.variance is None else frf.variance / np.abs(frf.values) ** 4,
+        unit=unit,
+        notes=(*frf.notes, note),
+    )
 
 
 def _one_sided(frf: MeasuredFrf) -> MeasuredFrf:

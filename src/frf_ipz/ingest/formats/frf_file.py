@@ -38,6 +38,8 @@ class FrfSource:
         Which data sets of a universal file to read, counted from 1; all FRFs where empty.
     is_conjugated : bool
         The file has the time convention exp(-i omega t).
+    is_reciprocal : bool
+        The file has force over response: the reciprocals of FRFs of `quantity`.
     level_N : float, optional
         Amplitude of the excitation, N, where the test holds the same FRFs at several.
     variables : tuple of pairs of str
@@ -54,6 +56,7 @@ class FrfSource:
     direction: str = ""
     sets: tuple[int, ...] = ()
     is_conjugated: bool = False
+    is_reciprocal: bool = False
     level_N: float | None = None  # noqa: N815  a unit
     variables: tuple[tuple[str, str], ...] = ()
 

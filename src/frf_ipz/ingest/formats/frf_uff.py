@@ -42,6 +42,8 @@ class _UniversalFile:
 
     def read(self, source: FrfSource) -> tuple[MeasuredFrf, ...]:
         functions = read_functions(source.path, read_bytes(source.path))
+        if source.is_reciprocal:  # their axes and ends are those of the motion over the force, the other way round
+            functions = tuple(map(_turned_round, functions))
         frfs, notes = _select(source, functions)
         coherences = {function.ends: function for function in functions if function.function_type == COHERENCE}
         measured = [_make_frf(source, function, coherences.get(function.ends)) for function in frfs]
@@ -64,6 +66,19 @@ class _UniversalFile:
 
 
 FORMAT = _UniversalFile()
+
+
+def _turned_round(function: UniversalFunction) -> UniversalFunction:
+    """Exchange numerator and denominator, but not the values, which are the reciprocals still."""
+    return replace(
+        function,
+        ordinate=function.denominator,
+        denominator=function.ordinate,
+        response_node=function.reference_node,
+        response_direction=function.reference_direction,
+        reference_node=function.response_node,
+        reference_direction=function.response_direction,
+    )
 
 
 def _select(source: FrfSource, functions: Sequence[UniversalFunction]) -> tuple[list[UniversalFunction], list[str]]:
@@ -124,6 +139,7 @@ def _make_frf(source: FrfSource, function: UniversalFunction, coherence: Univers
     input_dof = source.input_dof or _make_dof(source, function, reference, reference_direction, "reference")
     _check_quantity(source, function, f"{output_dof} / {input_dof}")
     unit, notes = _find_unit(source, function, output_dof, input_dof)
+    unit = f"1/({unit})" if unit and source.is_reciprocal else unit
     order = np.argsort(function.x, kind="stable")
     frequency_hz = function.x[order] * _abscissa_factor(source, function)
     values = function.values[order]
