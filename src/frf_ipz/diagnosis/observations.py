@@ -309,7 +309,8 @@ def observe(
     chosen = fit or FitOptions()
     band = measured_lines(frfs, chosen).band_hz
     records: tuple[ObservedRecord, ...] = ()
-    if test.kind != "frf" and frfs.unknown_scale == "none":
+    # records with several forces at once are analysed by their FRFs
+    if test.kind != "frf" and frfs.unknown_scale == "none" and len(test.input_channels) == 1:
         records = tuple(
             _select_sensors(record, test)
             for record in read_records(test, ingest or IngestOptions())

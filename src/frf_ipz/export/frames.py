@@ -109,6 +109,7 @@ FRAMES: dict[type, dict[str, MakeFrame]] = {
     FrfEstimate: {
         "records": lambda estimate: estimate.records,
         "frf": lambda estimate: estimate.frfs.to_frame(),
+        "coherence": lambda estimate: estimate.coherences,
     },
     ModalFit: {
         "poles": _of(run_tables.pole_table),

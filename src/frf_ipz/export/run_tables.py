@@ -68,6 +68,12 @@ FRF = (
     ),
     Column("averages", "int", "1", "records or segments averaged"),
 )
+COHERENCE = (
+    FREQUENCY,
+    *LABEL[:2],
+    Column("ordinary_coherence", "float", "1", "coherence of the response with this force alone"),
+    Column("multiple_coherence", "float", "1", "share of the response's power that all forces together explain"),
+)
 ROOT = (
     Column("frequency_hz", "float", "Hz", "undamped natural frequency |s| / 2 pi"),
     Column("damping_ratio", "float", "1", "-Re s / |s|"),
@@ -162,6 +168,7 @@ PARAMETER = (
 FILES = {
     "frf.parquet": FRF,
     "records.parquet": RECORD,
+    "coherence.parquet": COHERENCE,
     "poles.parquet": POLE,
     "zeros.parquet": ZERO,
     "fit.parquet": FIT,
@@ -368,6 +375,22 @@ def record_table(estimate: FrfEstimate) -> pa.Table:
         ``records.parquet``.
     """
     return frame_table(estimate.records, RECORD)
+
+
+def coherence_table(estimate: FrfEstimate) -> pa.Table:
+    """Table of coherences of several forces, one row an FRF and line.
+
+    Parameters
+    ----------
+    estimate : FrfEstimate
+        FRFs of several forces at once.
+
+    Returns
+    -------
+    pyarrow.Table
+        ``coherence.parquet``.
+    """
+    return frame_table(estimate.coherences, COHERENCE)
 
 
 def misfit_table(fit: ModalFit) -> pa.Table:

@@ -102,6 +102,8 @@ class TestSetup(Concise):
         The recordings, sorted.
     variables : tuple of pairs of str
         Columns of channels, ``time`` or ``sample_rate_hz``, and what these files call them.
+    further_input_dofs : tuple of Dof or PortDof
+        Where the other forces act, in the order of their channels, where several act at once.
 
     Examples
     --------
@@ -128,6 +130,12 @@ class TestSetup(Concise):
     output_dofs: tuple[AnyDof, ...]
     files: tuple[Path, ...]
     variables: tuple[tuple[str, str], ...] = ()
+    further_input_dofs: tuple[AnyDof, ...] = ()
+
+    @property
+    def input_dofs(self) -> tuple[AnyDof, ...]:
+        """Where all forces act."""
+        return (self.input_dof, *self.further_input_dofs)
 
     def names_in_files(self, columns: Sequence[str]) -> tuple[str, ...]:
         """Give what the files call some columns.
@@ -561,6 +569,7 @@ class VibrationTest(Concise):
                 replace(
                     setup,
                     input_dof=bind_port(setup.input_dof, ports),
+                    further_input_dofs=tuple(bind_port(dof, ports) for dof in setup.further_input_dofs),
                     output_dofs=tuple(bind_port(dof, ports) for dof in setup.output_dofs),
                 )
                 for setup in self.setups
@@ -586,13 +595,18 @@ class VibrationTest(Concise):
 
     @property
     def input_channel(self) -> Channel:
-        """The force."""
+        """The force; the first of several."""
         return self.channels[0]
+
+    @property
+    def input_channels(self) -> tuple[Channel, ...]:
+        """The forces: several where shakers act at once."""
+        return tuple(channel for channel in self.channels if channel.role == "input")
 
     @property
     def output_channels(self) -> tuple[Channel, ...]:
         """The responses."""
-        return self.channels[1:]
+        return tuple(channel for channel in self.channels if channel.role == "output")
 
     @property
     def output_dofs(self) -> tuple[AnyDof, ...]:
@@ -669,9 +683,12 @@ def setup_labels(channels: tuple[Channel, ...], setup: TestSetup) -> tuple[FrfLa
     Returns
     -------
     tuple of FrfLabel
-        One an output channel, in their order.
+        One an output channel, in their order; where several forces act at once, one a force of each.
     """
+    inputs = [channel.column for channel in channels if channel.role == "input"]
+    outputs = [channel for channel in channels if channel.role == "output"]
     return tuple(
-        FrfLabel(dof, setup.input_dof, frf_quantity_of(channel.quantity), channel.column, channels[0].column)
-        for channel, dof in zip(channels[1:], setup.output_dofs, strict=True)
+        FrfLabel(dof, force, frf_quantity_of(channel.quantity), channel.column, column)
+        for channel, dof in zip(outputs, setup.output_dofs, strict=True)
+        for column, force in zip(inputs, setup.input_dofs, strict=True)
     )

@@ -100,7 +100,7 @@ class ChannelKeys:
     column : str
         Header of its column; or its number, counted from 1, in files without a header or with a name twice.
     role : str
-        The input is the force; there is one.
+        The input is the force; there is one, or several of shakers that act at once.
     quantity : str
         What is measured; at a rotation, force stands for the moment, and the others for angular motion.
     unit : str, optional
@@ -108,7 +108,7 @@ class ChannelKeys:
     sensitivity : str, optional
         Instead of the unit, for example ``"10.2 mV/g_0"``: the column is then in the numerator's unit.
     dof : str, optional
-        Where an output sits; a ``[[hit]]`` or ``[[record]]`` may say otherwise.
+        Where an output sits, or one of several forces acts; a ``[[hit]]`` or ``[[record]]`` may say otherwise.
     mass_kg : float
         The sensor's own mass, where it is known: part of the model while the sensor sits there.
     """
@@ -131,9 +131,11 @@ class SetupKeys:
     Parameters
     ----------
     dof : str
-        Where the force acts, with its sign.
+        Where the force acts, with its sign; left out where several forces act at once.
     files : tuple of str
         Globs, relative to the file or absolute.
+    input_dofs : dict of str to str
+        Column of a force and where it acts in these files, where several act at once and the channel does not say it.
     output_dofs : dict of str to str
         Column of a roving sensor and where it sits in these files.
     variables : dict of str to str
@@ -143,8 +145,9 @@ class SetupKeys:
 
     __pydantic_config__ = STRICT
 
-    dof: str
     files: tuple[str, ...]
+    dof: str = ""
+    input_dofs: dict[str, str] = field(default_factory=dict)
     output_dofs: dict[str, str] = field(default_factory=dict)
     variables: dict[str, str] = field(default_factory=dict)
 
@@ -300,7 +303,8 @@ def read_test(path: str | Path) -> VibrationTest:
     channels = _read_channels(path, keys)
     entries = keys.hit or keys.record
     setups = tuple(
-        _read_setup(path, entry, channels, f"[[{ENTRY_OF_KIND[keys.test.kind]}]] {entry.dof}") for entry in entries
+        _read_setup(path, entry, channels, f"[[{ENTRY_OF_KIND[keys.test.kind]}]] {entry.dof}".rstrip())
+        for entry in entries
     )
     setups = tuple(_with_port_units(setup, channels) for setup in setups)
     _check_units(path, channels, setups)
@@ -371,12 +375,17 @@ def _read_channels(path: Path, keys: CampaignFileKeys) -> tuple[Channel, ...]:
                 "the file calls several so, write their numbers, as in column = 2",
             )
     inputs = [channel for channel in channels if channel.role == "input"]
-    if len(inputs) != 1:
-        raise FileFormatError(path, f"needed is exactly one [[channel]] with role = 'input'; given are {len(inputs)}")
+    if len(inputs) != 1 and (keys.test.kind != "random" or not inputs):
+        several = "; several forces at once belong to a test of kind 'random'" if inputs else ""
+        problem = f"needed is exactly one [[channel]] with role = 'input'; given are {len(inputs)}{several}"
+        raise FileFormatError(path, problem)
+    if len(inputs) == 1 and inputs[0].dof is not None:
+        problem = "an input has no 'dof' where it is the only one: the [[hit]] or [[record]] says where it acts"
+        raise FileFormatError(path, problem, where=f"[[channel]] '{inputs[0].column}'")
     outputs = [channel for channel in channels if channel.role == "output"]
     if not outputs:
         raise FileFormatError(path, "needed is at least one [[channel]] with role = 'output'")
-    return (inputs[0], *outputs)
+    return (*inputs, *outputs)
 
 
 def _read_channel(path: Path, keys: ChannelKeys) -> Channel:
@@ -386,10 +395,8 @@ def _read_channel(path: Path, keys: ChannelKeys) -> Channel:
         raise FileFormatError(path, problem, where=where)
     if keys.unit is not None and keys.sensitivity is not None:
         raise FileFormatError(path, "has both 'unit' and 'sensitivity'; a sensitivity replaces the unit", where=where)
-    if keys.role == "input" and (keys.dof or keys.mass_kg):
-        raise FileFormatError(
-            path, "an input has no 'dof' and no 'mass_kg': the [[hit]] or [[record]] says where it acts", where=where
-        )
+    if keys.role == "input" and keys.mass_kg:
+        raise FileFormatError(path, "an input has no 'mass_kg': the shaker is no part of the structure", where=where)
     return Channel(
         column=str(keys.column),
         role=keys.role,
@@ -432,9 +439,15 @@ def bind_ports(test: VibrationTest, ports: Mapping[PortDof, PortDof]) -> Vibrati
 
 def _with_port_units(setup: TestSetup, channels: tuple[Channel, ...]) -> TestSetup:
     """Take from the units of channels whether ports are angles, until a model says so."""
-    ends = zip((setup.input_dof, *setup.output_dofs), channels, strict=True)
-    input_dof, *output_dofs = (_with_port_unit(dof, channel) for dof, channel in ends)
-    return replace(setup, input_dof=input_dof, output_dofs=tuple(output_dofs))
+    ends = zip((*setup.input_dofs, *setup.output_dofs), channels, strict=True)
+    dofs = [_with_port_unit(dof, channel) for dof, channel in ends]
+    n_inputs = len(setup.input_dofs)
+    return replace(
+        setup,
+        input_dof=dofs[0],
+        further_input_dofs=tuple(dofs[1:n_inputs]),
+        output_dofs=tuple(dofs[n_inputs:]),
+    )
 
 
 def _with_port_unit(dof: AnyDof, channel: Channel) -> AnyDof:
@@ -451,7 +464,7 @@ def _with_port_unit(dof: AnyDof, channel: Channel) -> AnyDof:
 def _check_units(path: Path, channels: tuple[Channel, ...], setups: tuple[TestSetup, ...]) -> None:
     """Refuse units that cannot be right before anything is read; a moment or a rotation has its own."""
     for setup in setups:
-        for channel, dof in zip(channels, (setup.input_dof, *setup.output_dofs), strict=True):
+        for channel, dof in zip(channels, (*setup.input_dofs, *setup.output_dofs), strict=True):
             if not channel.unit and not channel.sensitivity:
                 continue
             convert = sensitivity_factor if channel.sensitivity else unit_factor
@@ -462,7 +475,8 @@ def _check_units(path: Path, channels: tuple[Channel, ...], setups: tuple[TestSe
 
 
 def _read_setup(path: Path, keys: SetupKeys, channels: tuple[Channel, ...], where: str) -> TestSetup:
-    outputs = {channel.column: channel.dof for channel in channels[1:]}
+    outputs = {channel.column: channel.dof for channel in channels if channel.role == "output"}
+    input_dofs = _read_input_dofs(path, keys, [channel for channel in channels if channel.role == "input"], where)
     for column, text in keys.output_dofs.items():
         if column not in outputs:
             problem = f"'output_dofs' names '{column}', which is no output channel; {did_you_mean(column, outputs)}"
@@ -473,16 +487,44 @@ def _read_setup(path: Path, keys: SetupKeys, channels: tuple[Channel, ...], wher
         problem = f"the output '{missing[0]}' has no DOF: give its channel a 'dof', or name it in 'output_dofs'"
         raise FileFormatError(path, problem, where=where)
     output_dofs = tuple(dof for dof in outputs.values() if dof is not None)
-    _check_motions(path, channels[1:], output_dofs, where)
+    _check_motions(path, tuple(channel for channel in channels if channel.role == "output"), output_dofs, where)
     files = [file for pattern in keys.files for file in _expand_pattern(path, pattern, where)]
     if not files:
         raise FileFormatError(path, "'files' is empty; name at least one recording", where=where)
     return TestSetup(
-        input_dof=_parse_dof(path, keys.dof, where),
+        input_dof=input_dofs[0],
+        further_input_dofs=input_dofs[1:],
         output_dofs=output_dofs,
         files=tuple(dict.fromkeys(files)),
         variables=_read_variables(path, keys.variables, [channel.column for channel in channels], where),
     )
+
+
+def _read_input_dofs(path: Path, keys: SetupKeys, inputs: list[Channel], where: str) -> tuple[AnyDof, ...]:
+    """Find where the forces act: by the entry, or by the channels where several act at once."""
+    if len(inputs) == 1:
+        if not keys.dof:
+            raise FileFormatError(path, "needs 'dof': where the force acts, as in dof = \"18:+z\"", where=where)
+        if keys.input_dofs:
+            raise FileFormatError(path, "has 'input_dofs', and the test has one input; write 'dof'", where=where)
+        return (_parse_dof(path, keys.dof, where),)
+    known = {channel.column: channel.dof for channel in inputs}
+    if keys.dof:
+        problem = f"has one 'dof', and the test has {len(inputs)} inputs; give each input channel its 'dof'"
+        raise FileFormatError(path, f"{problem}, or name them in 'input_dofs'", where=where)
+    for column, text in keys.input_dofs.items():
+        if column not in known:
+            problem = f"'input_dofs' names '{column}', which is no input channel; {did_you_mean(column, known)}"
+            raise FileFormatError(path, problem, where=where)
+        known[column] = _parse_dof(path, text, where)
+    for column, dof in known.items():
+        if dof is None:
+            problem = f"the input '{column}' has no DOF: give its channel a 'dof', or name it in 'input_dofs'"
+            raise FileFormatError(path, problem, where=where)
+    dofs = tuple(dof for dof in known.values() if dof is not None)
+    if len({dof.name for dof in dofs}) < len(dofs):
+        raise FileFormatError(path, "two inputs act at the same DOF; correct a 'dof', or take one out", where=where)
+    return dofs
 
 
 def _read_variables(

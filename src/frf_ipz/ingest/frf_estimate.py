@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import pandas as pd
 
@@ -58,6 +58,9 @@ class FrfEstimate(Tabulated, Drawn):
         Whatever the user has to know.
     modes : ModalParameters, optional
         Modes of a test that has no FRFs; `frfs` is then empty, and has the lines on which a model is evaluated.
+    coherences : DataFrame
+        Where several forces act at once, one row an FRF and line: ``frequency_hz, output_dof, input_dof,
+        ordinary_coherence, multiple_coherence``; the coherence of `frfs` is then the multiple one. Else empty.
 
     Examples
     --------
@@ -86,6 +89,7 @@ class FrfEstimate(Tabulated, Drawn):
     choices: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     modes: ModalParameters | None = None
+    coherences: pd.DataFrame = field(default_factory=pd.DataFrame)
 
     def __repr__(self) -> str:
         if self.modes is not None:

@@ -128,7 +128,7 @@ class RecordingFiles:
         recording = open_recording(path, columns, setup.keys_for_files(self.test.table))
         for note in recording.notes:
             self._notes.setdefault(note, {})[path] = None
-        dofs = (setup.input_dof, *setup.output_dofs)
+        dofs = (*setup.input_dofs, *setup.output_dofs)
         factors = [_time_factor(recording)]
         factors += [
             _channel_factor(path, channel, dof, file_unit)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.ingest.estimation.averaging import average_recordings
+from frf_ipz.ingest.estimation.several_inputs import estimate_random_several
 from frf_ipz.ingest.signals.transients import transform_subrecords
 from frf_ipz.ingest.signals.windows import count_independent_segments, cut_segments
 
@@ -45,6 +46,8 @@ def estimate_random(test: VibrationTest, options: IngestOptions, progress: Progr
     InputError
         If a recording cannot be used.
     """
+    if len(test.input_channels) > 1:
+        return estimate_random_several(test, options, progress)
     return average_recordings(test, options, progress, _add_record)
 
 

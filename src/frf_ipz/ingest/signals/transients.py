@@ -46,8 +46,8 @@ def transform_without_transients(
 
     Parameters
     ----------
-    force : (n_samples,) array
-        Random, N.
+    force : (n_samples,) or (n_inputs, n_samples) array
+        Random, N; several forces that act at once are fitted together.
     responses : (n_outputs, n_samples) array
         SI.
     lines : (n_lines,) int array, optional
@@ -57,21 +57,21 @@ def transform_without_transients(
 
     Returns
     -------
-    force : (n_lines,) complex array
+    force : (n_lines,) or (n_inputs, n_lines) complex array
         Its transform, ``sum f(t) exp(-s t)``, times the weight of its line, at most 1.
     responses : (n_outputs, n_lines) complex array
         Those of the responses less their transients: the FRF times that of the force.
     """
-    n = len(force)
+    n = force.shape[-1]
     turn = np.exp(-2j * np.pi * between * np.arange(n) / n)
     F, X = np.fft.fft(force * turn), np.fft.fft(responses * turn)
     lines = np.arange(n // 2 + 1) if lines is None else lines
     if n < 2 * len(_X):
-        return F[lines], X[:, lines]
+        return F[..., lines], X[:, lines]
     blocks = [lines[start : start + BLOCK] for start in range(0, len(lines), BLOCK)]
-    parts = [_fit_transients(F, X, block) for block in blocks]
+    parts = [_fit_transients(np.atleast_2d(F), X, block) for block in blocks]
     transients, weights = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
-    return F[lines] * weights, (X[:, lines] - transients) * weights
+    return F[..., lines] * weights, (X[:, lines] - transients) * weights
 
 
 def transform_subrecords(
@@ -81,7 +81,7 @@ def transform_subrecords(
 
     Parameters
     ----------
-    force : (n_samples,) array
+    force : (n_samples,) or (n_inputs, n_samples) array
         N.
     responses : (n_outputs, n_samples) array
         SI.
@@ -95,37 +95,44 @@ def transform_subrecords(
     force, responses : complex arrays
         As `transform_without_transients` gives them.
     """
-    for start in range(0, len(force) - length + 1, length):
+    for start in range(0, force.shape[-1] - length + 1, length):
         samples = slice(start, start + length)
-        yield transform_without_transients(force[samples], responses[:, samples], lines, between=between)
+        yield transform_without_transients(force[..., samples], responses[:, samples], lines, between=between)
 
 
 def _fit_transients(F: ComplexArray, X: ComplexArray, lines: IntArray) -> tuple[ComplexArray, FloatArray]:
     """T at some lines, (n_outputs, n), and their weights; M is projected out first, then N and D are fitted."""
     n_outputs, n, width, terms = len(X), len(lines), len(_X), DEGREE + 1
-    around = (lines[:, None] + np.arange(-SIDE, SIDE + 1)) % len(F)  # lines below 0 Hz are those from the other end
-    forces, responses = F[around], np.moveaxis(X[:, around], 0, 1)
-    rough_forces = (forces @ _OFF_SMOOTH).reshape(n, terms, width)
+    around = (lines[:, None] + np.arange(-SIDE, SIDE + 1)) % F.shape[1]  # lines below 0 Hz are those from the other end
+    forces, responses = np.moveaxis(F[:, around], 0, 1), np.moveaxis(X[:, around], 0, 1)
+    rough_forces = (forces @ _OFF_SMOOTH).reshape(n, len(F) * terms, width)
     rough_responses = (responses @ _OFF_SMOOTH).reshape(n, n_outputs * terms, width)
     numerators = _fit_rows(rough_forces, rough_responses)
     misfits = (rough_responses - numerators @ rough_forces).reshape(n, n_outputs, terms, width)
     power = np.maximum(np.sum(np.abs(misfits[:, :, 0]) ** 2, axis=2), np.finfo(float).tiny)
     rows = np.moveaxis(misfits / np.sqrt(power)[:, :, None, None], 1, 2).reshape(n, terms, n_outputs * width)
     denominator = np.concatenate([np.ones((n, 1)), -_fit_rows(rows[:, 1:], rows[:, :1])[:, 0]], axis=1)
-    smooth = responses @ _MIDDLE - (numerators @ (forces @ _MIDDLE)[:, :, None]).reshape(n, n_outputs, terms)
+    smooth = responses @ _MIDDLE - (numerators @ (forces @ _MIDDLE).reshape(n, -1, 1)).reshape(n, n_outputs, terms)
     return np.asarray((smooth @ denominator[:, :, None])[:, :, 0].T), _line_weights(forces, rough_forces)
 
 
 def _line_weights(forces: ComplexArray, rough_forces: ComplexArray) -> FloatArray:
-    """(n,) roots of the weights of lines: the information on G beside M over that without M, over `ROUGH`."""
-    with_transient, without_transient = _information(rough_forces), _information(forces[:, None] * _POWERS.T)
-    ratio = with_transient / (ROUGH * np.maximum(without_transient, np.finfo(float).tiny))
-    return np.sqrt(np.clip(ratio, np.finfo(float).eps, 1.0))
+    """(n,) roots of the weights of lines: the information on G beside M over that without M, over `ROUGH`.
+
+    Of several forces the one counts of which least is known.
+    """
+    n, n_inputs = forces.shape[:2]
+    all_forces = (forces[:, :, None] * _POWERS.T).reshape(n, -1, len(_X))
+    ratios = []
+    for first in range(0, n_inputs * (DEGREE + 1), DEGREE + 1):
+        with_transient, without_transient = _information(rough_forces, first), _information(all_forces, first)
+        ratios.append(with_transient / (ROUGH * np.maximum(without_transient, np.finfo(float).tiny)))
+    return np.asarray(np.sqrt(np.clip(np.min(ratios, axis=0), np.finfo(float).eps, 1.0)))
 
 
-def _information(rows: ComplexArray) -> FloatArray:
-    """(n,) squared norm of the part of the first row, (n, p, width), that is orthogonal to the further rows."""
-    first_row, further_rows = rows[:, :1], rows[:, 1:]
+def _information(rows: ComplexArray, place: int) -> FloatArray:
+    """(n,) squared norm of the part of one row, (n, p, width), that is orthogonal to the others."""
+    first_row, further_rows = rows[:, place : place + 1], np.delete(rows, place, axis=1)
     return np.asarray(np.sum(np.abs(first_row - _fit_rows(further_rows, first_row) @ further_rows) ** 2, axis=(1, 2)))
 
 

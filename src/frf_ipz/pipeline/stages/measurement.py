@@ -42,14 +42,7 @@ def ingest(runner: StageRunner) -> FrfEstimate:
         "ingest",
         {"options": asdict(options), "test": repr(runner.inputs.test), "files": files},
         lambda progress: estimate_frfs(runner.inputs.test, options=options, progress=progress),
-        lambda result: (
-            {}
-            if result.modes is not None
-            else {
-                "frf.parquet": partial(write_table, tables.frf_table(result.frfs)),
-                "records.parquet": partial(write_table, tables.record_table(result)),
-            }
-        ),
+        _files_of_ingest,
     )
 
 
@@ -85,6 +78,19 @@ def fit(
         lambda progress: fit_modes(frfs if modes is None else modes, options=options, progress=progress),
         lambda result: _files_of_fit(frfs, result),
     )
+
+
+def _files_of_ingest(result: FrfEstimate) -> Writers:
+    """Write FRFs and records, where there are any; and the coherences of several forces."""
+    if result.modes is not None:
+        return {}
+    files: Writers = {
+        "frf.parquet": partial(write_table, tables.frf_table(result.frfs)),
+        "records.parquet": partial(write_table, tables.record_table(result)),
+    }
+    if not len(result.coherences):
+        return files
+    return {**files, "coherence.parquet": partial(write_table, tables.coherence_table(result))}
 
 
 def _files_of_fit(frfs: FrfSet, result: ModalFit) -> Writers:
