@@ -246,15 +246,15 @@ def _segment_length(test: VibrationTest, records: list[list[FloatArray]], step_s
         if length < SHORTEST_SEGMENT or worth(length) <= n_inputs + 1:
             raise InputError(
                 f"{test.path}: [ingest] segment_s = {options.segment_s:g} gives {worth(max(length, 1)):.3g} "
-                f"independent segments of {length} samples; {n_inputs} forces need more than {n_inputs + 1}, of {SHORTEST_SEGMENT} "
-                "samples at least"
+                f"independent segments of {length} samples; {n_inputs} forces need more than {n_inputs + 1}, of "
+                f"{SHORTEST_SEGMENT} samples at least"
             )
         return int(length)
     length = max(record.shape[1] for parts in records for record in parts)
     while length >= SHORTEST_SEGMENT and subrecords(length) < needed:
         length = int(length / np.sqrt(2.0))
     if length < SHORTEST_SEGMENT:
-        raise InputError(f"{test.path}: records are too short for {needed} sub-records; {n_inputs} forces need as many")
+        raise InputError(f"{test.path}: records are too short for the {needed} parts that {n_inputs} forces need")
     return length
 
 

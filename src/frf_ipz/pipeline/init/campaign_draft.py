@@ -75,7 +75,8 @@ def _test_of_recordings(contents: FolderContents, places: Places) -> str:
         elif not _dofs_of(columns, column.name):
             lines.append(guessed(f"dof = {quoted(places.of_sensor(number))}", "NODE:SIGN DIRECTION of the sensor"))
         lines.append(with_comment("# mass_kg = 0.004", "the sensor's own mass, where it is known"))
-    lines += [f"\n# the column {quoted(column.name)} is a force too; a test has one" for column in columns.other_forces]
+    also = "is a force too; several at once are inputs with a 'dof' each, of kind \"random\""
+    lines += [f"\n# the column {quoted(column.name)} {also}" for column in columns.other_forces]
     return "\n".join([*lines, *_setups(contents, places, columns, ENTRIES[kind])]) + "\n"
 
 

@@ -71,7 +71,7 @@ class Columns:
     responses : tuple of Column
         The outputs.
     other_forces : tuple of Column
-        Further forces; a test has one.
+        Further forces.
     has_time : bool
         The files say when their samples were taken.
     dofs : dict of Path to dict of str to Dof
