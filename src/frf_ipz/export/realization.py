@@ -118,7 +118,9 @@ def _unstrained(model: ReducedModel) -> FloatArray:
 def _elastic_modes(model: ReducedModel, rigid: FloatArray) -> FloatArray:
     """Mass-normalised modes of the symmetric part beside the rigid ones, by ascending frequency."""
     stiffness = (model.stiffness + model.stiffness.T) / 2
-    shapes = undamped_poles(model.mass, stiffness).right_vectors.real[:, rigid.shape[1] :]
+    poles = undamped_poles(model.mass, stiffness)
+    beside_rigid = np.sort(np.argsort(np.abs(poles.values), kind="stable")[rigid.shape[1] :])
+    shapes = poles.right_vectors.real[:, beside_rigid]
     shapes = shapes - rigid @ (rigid.T @ model.mass @ shapes)
     if not shapes.shape[1]:
         return shapes

@@ -67,7 +67,7 @@ class Basis:
     @property
     def loaded_shapes(self) -> FloatArray:
         """Shapes of the modes near the band, at all DOFs, (n_all, m) array."""
-        count = max(int(np.count_nonzero(np.sqrt(self.modes.eigenvalues) <= LOADED_MODES * self.highest_rad_s)), 1)
+        count = max(int(np.count_nonzero(self.modes.omega_rad_s <= LOADED_MODES * self.highest_rad_s)), 1)
         return _to_all_dofs(self.model, self.modes.shapes[:, :count])
 
     def project(self, matrix: Matrix) -> FloatArray:
@@ -105,7 +105,7 @@ def make_basis(model: StructuralModel, highest_rad_s: float, measured: Sequence[
     """
     order = int(np.count_nonzero(~model.fixed))
     modes = solve_basis(model) if order < DENSE_ORDER else _solve_lowest_modes(model, highest_rad_s)
-    low = max(int(np.count_nonzero(np.sqrt(modes.eigenvalues) <= MODES_UP_TO * highest_rad_s)), min(MIN_MODES, order))
+    low = max(int(np.count_nonzero(modes.omega_rad_s <= MODES_UP_TO * highest_rad_s)), min(MIN_MODES, order))
     start = modes.first(low)
     loads = model.full_rows([dof.unsigned for dof in measured]).toarray().T
     plain = Basis(

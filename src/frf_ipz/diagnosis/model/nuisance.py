@@ -291,7 +291,7 @@ def make_nuisance_prior(basis: Basis, layout: Layout, options: DiagnoseOptions) 
     NuisancePrior
         The parameters.
     """
-    frequencies = np.sqrt(basis.modes.eigenvalues)
+    frequencies = basis.modes.omega_rad_s
     n_modes = max(
         int(np.count_nonzero(frequencies <= MODES_BEYOND * basis.highest_rad_s)), 1, _count_lowered_modes(basis)
     )

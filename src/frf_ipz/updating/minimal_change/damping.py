@@ -282,7 +282,7 @@ def damping_phase(
         Ready to iterate.
     """
     typical_ratio = max(float(np.median(damping_ratio(values))), SMALLEST_RATIO)
-    omega = np.sqrt(inner.eigenvalues)
+    omega = np.sqrt(np.maximum(inner.eigenvalues, 0.0))
     matrix = matrix - dashpots
     nominal = np.diagonal(matrix)
     rates = np.where(nominal > NO_DAMPING * typical_ratio * omega, nominal, 2 * typical_ratio * omega)

@@ -11,7 +11,7 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.updating.gaussian import draw_posterior
 from frf_ipz.updating.minimal_change.damping import DampingPhase
 from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult
-from frf_ipz.updating.minimal_change.modal_frame import ModalFrame
+from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, is_negative
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase
 from frf_ipz.updating.parameters import unwhiten
 
@@ -92,7 +92,10 @@ def _draw_stiffness(
     ) @ sensitivity.T
     squares = np.exp(2 * predicted)
     shapes = next((roots.right_vectors.real for _, roots in result.tracked.groups if len(poles)), None)
-    return theta, mass, stiffness if shapes is None else _with_poles(mass, stiffness, shapes, squares)
+    if shapes is None:
+        return theta, mass, stiffness
+    n_negative = int(np.count_nonzero(is_negative(phase.eigenvalues)))
+    return theta, mass, _with_poles(mass, stiffness, shapes, squares, n_negative)
 
 
 def _draw(result: PhaseResult, rng: np.random.Generator, count: int) -> FloatArray:
@@ -101,11 +104,13 @@ def _draw(result: PhaseResult, rng: np.random.Generator, count: int) -> FloatArr
     return draw_posterior(result.step, result.linear, scales, result.noise, rng, count, factor=factor)
 
 
-def _with_poles(mass: FloatArray, stiffness: FloatArray, shapes: FloatArray, squares: FloatArray) -> FloatArray:
-    """Give squared frequencies to the modes most like some shapes; negative eigenvalues of the rest become 0."""
+def _with_poles(
+    mass: FloatArray, stiffness: FloatArray, shapes: FloatArray, squares: FloatArray, n_negative: int
+) -> FloatArray:
+    """Give squared frequencies to the modes most like some shapes; of the rest as many are negative as the model's."""
     lower = np.linalg.inv(np.linalg.cholesky(mass))
     values, vectors = np.linalg.eigh(lower @ stiffness @ lower.swapaxes(1, 2))
-    values = np.maximum(values, 0.0)
+    values[:, n_negative:] = np.maximum(values[:, n_negative:], 0.0)
     sides = mass @ (lower.swapaxes(1, 2) @ vectors)
     likeness = (shapes.T @ sides) ** 2
     for member in range(len(values)):

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import BoolArray, FloatArray
 from frf_ipz.numerics.pencils import undamped_poles
 
 if TYPE_CHECKING:
     from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.parameters import ParameterBasis
+
+INDEFINITE = 1e-9  # part of the largest eigenvalue below which a negative one is rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -22,7 +24,7 @@ class ModalFrame:
     Parameters
     ----------
     eigenvalues : (r,) array
-        Squared natural frequencies, (rad/s)^2.
+        Squared natural frequencies, (rad/s)^2; negative ones only where the model has a negative stiffness.
     shapes : (r, r) array
         Mass-normalised modes at the model's own coordinates.
     inverse : (r, r) array
@@ -79,8 +81,25 @@ def modal_frame(mass: FloatArray, stiffness: FloatArray) -> ModalFrame:
         Modes by ascending frequency.
     """
     poles = undamped_poles(mass, stiffness)
-    shapes = poles.right_vectors.real
-    return ModalFrame(eigenvalues=np.maximum(poles.values.real, 0.0), shapes=shapes, inverse=shapes.T @ mass)
+    shapes, values = poles.right_vectors.real, poles.values.real
+    is_rounding = (values < 0) & ~is_negative(values)
+    return ModalFrame(eigenvalues=np.where(is_rounding, 0.0, values), shapes=shapes, inverse=shapes.T @ mass)
+
+
+def is_negative(eigenvalues: FloatArray) -> BoolArray:
+    """Tell eigenvalues of a negative stiffness from those of rigid-body modes, which rounding makes negative.
+
+    Parameters
+    ----------
+    eigenvalues : (..., r) array
+        Of a stiffness.
+
+    Returns
+    -------
+    (..., r) bool array
+        True for negative ones beyond rounding.
+    """
+    return np.asarray(eigenvalues < -INDEFINITE * np.abs(eigenvalues).max(axis=-1, keepdims=True))
 
 
 def frame_of(model: ReducedModel) -> ModalFrame:

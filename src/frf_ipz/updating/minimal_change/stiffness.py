@@ -12,13 +12,13 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.numerics.low_rank import LowRankMatrices
+from frf_ipz.updating.minimal_change.modal_frame import is_negative
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
 from frf_ipz.updating.target_noise import TargetNoise
 from frf_ipz.updating.tracking import TargetRoots, TrackedRoots, nominal_roots, track
 
 POLE_SLACK = 1e-7  # relative standard deviation of a true pole that a reduced model cannot express: it has its modes
 ZERO_SLACK = 1e-5  # the same of a zero, which depends on the modes beyond as well
-INDEFINITE = 1e-9  # part of the largest eigenvalue below which a negative one is rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -109,11 +109,12 @@ class StiffnessPhase:
         Returns
         -------
         TrackedRoots or None
-            None where the stiffness is indefinite or the mass not positive.
+            None where the stiffness has more negative eigenvalues than the model's, or the mass is not positive.
         """
         mass, stiffness = self.matrices(theta)
-        values = np.linalg.eigvalsh(stiffness)
-        if values[0] < -INDEFINITE * values[-1] or (self.changes_mass and np.linalg.eigvalsh(mass)[0] <= 0):
+        n_negative = np.count_nonzero(is_negative(np.asarray(np.linalg.eigvalsh(stiffness), float)))
+        is_indefinite = n_negative > np.count_nonzero(is_negative(self.eigenvalues))
+        if is_indefinite or (self.changes_mass and np.linalg.eigvalsh(mass)[0] <= 0):
             return None
         return track(self.target_roots, reference, mass, stiffness)
 

@@ -263,7 +263,7 @@ def find_locations(model: StructuralModel, directions: set[str]) -> tuple[Locati
 
 def _suspended_poles(model: StructuralModel, basis: ModalBasis) -> tuple[FloatArray, FloatArray]:
     """Frequencies and damping ratios; rigid-body modes get those of a soft suspension."""
-    omega, ratio = np.sqrt(basis.eigenvalues), damping_ratios(model, basis)
+    omega, ratio = basis.omega_rad_s, damping_ratios(model, basis)
     rigid = basis.n_rigid
     if rigid:
         omega[:rigid] = SUSPENSION_PART * (omega[rigid] if len(omega) > rigid else 1.0)
