@@ -393,6 +393,8 @@ def _convert(value: pint.Quantity[float], si: str, problem: str, quantity: str) 
         hint = EXAMPLES.get(quantity) or f"a unit like {si}"
         other = [name for name in MOTIONS if quantity in MOTIONS and value.is_compatible_with(si_unit(name))]
         instead = f', or quantity = "{other[0]}"' if other else ""
+        if quantity and value.is_compatible_with("V"):
+            instead = f', or what the sensor gives, as in sensitivity = "10 mV/{f"({si})" if "/" in si else si}"'
         raise QuantityError(f"{problem}; expected is {hint}{instead}") from None
     if not math.isfinite(factor) or factor == 0.0:
         raise QuantityError(f"{problem}: it is {factor:g} {si}; write a unit, without a number that is zero or NaN")

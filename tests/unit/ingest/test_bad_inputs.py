@@ -43,6 +43,7 @@ def message(path, **options):
         ('unit = "N"', 'unit = "Newtons-ish"', r"\[\[channel\]\] 'force'.*'Newtons-ish' is no unit that can be read"),
         ('unit = "N"', 'unit = "0 N"', r"\[\[channel\]\] 'force'.*'0 N' is no unit of force: it is 0 N"),
         ('unit = "N"', 'unit = "N NaN"', "'N NaN' is no unit of force: it is nan N"),
+        ('unit = "N"', 'unit = "mV"', r"'mV' is no unit of force; .*, as in sensitivity = \"10 mV/N\""),
         ('unit = "N"', 'unit = "mm"', r"\[\[channel\]\] 'force'.*'mm' is no unit of force; expected is N, kN or lbf"),
         ('unit = "m/s^2"', 'unit = "kg"', "'kg' is no unit of acceleration; expected is m/s.2 or g"),
         ('unit = "N"', 'sensitivity = "10 mV"', "'10 mV' is no ratio of units; write it as in '10.2 mV/g'"),
