@@ -132,6 +132,12 @@ def calls():
         "read_model": ({"path": "x.toml"}, {"path": [Path(__file__)]}),
         "read_state_space": ({"path": "x.json"}, {"path": [Path(__file__)]}),
         "read_test": ({"path": "x.toml"}, {"path": [Path(__file__)]}),
+        "read_updated_model": ({"path": "x.npz"}, {"path": [Path(__file__)]}),
+        "rebuild_state_space": (
+            {"path": "x.npz", "inputs": ["1:z"], "outputs": ["2:z"]},
+            {"path": [Path(__file__)], "inputs": ["1:z", 3], "options": [3]},
+        ),
+        "decouple_rigid_body": ({"system": 3}, {"axes": ["height", 3]}),
         "read_uncertainty_weights": ({"path": "x.json"}, {"path": [Path(__file__)]}),
         "reduce_model": (
             {"measured": g.fit, "fe_model": g.beam},

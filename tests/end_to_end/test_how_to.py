@@ -12,7 +12,15 @@ HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 
 @pytest.mark.parametrize(
     ("name", "count"),
-    [("arrays", 4), ("own_effect", 1), ("fleets", 2), ("extend", 2), ("modes_only", 1), ("other_software", 1)],
+    [
+        ("arrays", 4),
+        ("ports", 1),
+        ("own_effect", 1),
+        ("fleets", 2),
+        ("extend", 2),
+        ("modes_only", 1),
+        ("other_software", 1),
+    ],
 )
 def test_page(name, count, tmp_path):
     with contextlib.chdir(tmp_path):

@@ -7,6 +7,7 @@ channel a single-loop controller fits. More actuators or sensors than modes shar
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -132,9 +133,11 @@ def decouple_rigid_body(
     ...     output_units=("m",),
     ... )
     >>> decoupled = frf_ipz.decouple_rigid_body(mass, axes=["1:+x"]).apply(mass)
-    >>> abs(complex(decoupled(2j)[0, 0] * (2j) ** 2))
+    >>> abs(complex(decoupled(2j)) * (2j) ** 2)
     1.0
     """
+    if isinstance(axes, str) or not isinstance(axes, Iterable):
+        raise InputError(f"axes = {axes!r} is no list; give names of outputs such as ['height', 'pitch']")
     model = _as_model(system)
     states = _rigid_states(model)
     step = model.dt or 1.0

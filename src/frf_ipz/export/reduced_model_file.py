@@ -96,6 +96,28 @@ def read_updated_model(path: str | Path) -> ReducedModel:
     ------
     FileFormatError
         If the file holds no such model.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... ).with_ports([frf_ipz.Port("tip tilt", {"11:z": 20.0, "10:z": -20.0}, "rad")])
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = frf_ipz.Campaign(frfs, beam).run(folder, until="export")
+    ...     path = f"{folder}/updated_model.npz"
+    ...     model = frf_ipz.read_updated_model(path)
+    >>> [str(dof) for dof in model.expanded_dofs if dof not in model.dofs]
+    ['tip tilt']
     """
     path = require_file(path)
     try:
