@@ -20,20 +20,23 @@ from frf_ipz.ingest.campaign import (
     VibrationTest,
     setup_labels,
 )
+from frf_ipz.ingest.formats.frf_conventions import read_frf_source
 from frf_ipz.ingest.formats.frf_file import FrfSource, frf_label
 from frf_ipz.ingest.formats.modes_file import ModesSource
 from frf_ipz.ingest.formats.recording import TableKeys
 from frf_ipz.ingest.formats.registry import read_frf_file, read_modes_file
+from frf_ipz.ingest.formats.transmissibility import no_reference
 from frf_ipz.ingest.units import sensitivity_factor, unit_factor
 from frf_ipz.option_types import Count, CountOrNone, Day, NotNegative, Positive, Ratio
 from frf_ipz.quantities import RECIPROCALS, FrfQuantity
 from frf_ipz.toml_files import STRICT, read_toml
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     from frf_ipz.dofs import PortDof
 
+TRANSMISSIBILITY = "transmissibility"
 ENTRY_OF_KIND = {"hammer": "hit", "random": "record", "frf": "frf", "modes": "modes"}
 
 WITHOUT_CHANNELS = {"frf": "FRFs say themselves what they connect", "modes": "modes name their DOFs themselves"}
@@ -162,7 +165,10 @@ class FrfKeys:
         Its path.
     quantity : str
         Displacement, velocity or acceleration over force; or force over one of them, whose reciprocals are taken. The
-        output is where the motion was measured, and the input where the force acts, in both.
+        output is where the motion was measured, and the input where the force acts, in both. A transmissibility is a
+        response over that of a reference, its input; it is multiplied by the FRF of the reference, another ``[[frf]]``.
+    force_dof : str, optional
+        Where the force acts, for a transmissibility.
     unit : str, optional
         Of the values; SI where it is left out and the file does not say.
     output_dof, input_dof : str or tuple of str, optional
@@ -191,8 +197,11 @@ class FrfKeys:
     __pydantic_config__ = STRICT
 
     file: str
-    quantity: Literal["receptance", "mobility", "accelerance", "dynamic_stiffness", "impedance", "apparent_mass"]
+    quantity: Literal[
+        "receptance", "mobility", "accelerance", "dynamic_stiffness", "impedance", "apparent_mass", "transmissibility"
+    ]
     unit: str | None = None
+    force_dof: str | None = None
     output_dof: str | tuple[str, ...] | None = None
     input_dof: str | tuple[str, ...] | None = None
     columns: tuple[str, ...] = ()
@@ -309,7 +318,8 @@ def read_test(path: str | Path) -> VibrationTest:
     setups = tuple(_with_port_units(setup, channels) for setup in setups)
     _check_units(path, channels, setups)
     _check_files_once(path, setups)
-    sources = tuple(_read_source(path, entry) for entry in keys.frf)
+    stated = tuple(_read_source(path, entry) for entry in keys.frf)
+    sources = tuple(_with_reference(source, stated) for source in stated)
     labels = [label for setup in setups for label in setup_labels(channels, setup)]
     labels += [label for source in sources for label in _labels_of_source(source)]
     modes_source = next((_read_modes_source(path, entry) for entry in keys.modes), None)
@@ -338,6 +348,8 @@ def read_test(path: str | Path) -> VibrationTest:
 
 
 def _labels_of_source(source: FrfSource) -> list[FrfLabel]:
+    if source.reference is not None:
+        return [frf.label for frf in read_frf_source(source)]
     if source.output_dof is not None and source.input_dof is not None:
         return [frf_label(source.output_dof, source.input_dof, source.quantity)]
     return [frf.label for frf in read_frf_file(source)]
@@ -562,7 +574,9 @@ def _read_source(path: Path, keys: FrfKeys) -> FrfSource:
     where = f"[[frf]] '{keys.file}'"
     return FrfSource(
         path=path.parent / keys.file,
-        quantity=RECIPROCALS.get(keys.quantity) or FrfQuantity(keys.quantity),
+        quantity=RECIPROCALS.get(keys.quantity)
+        or (FrfQuantity.ACCELERANCE if keys.quantity == TRANSMISSIBILITY else FrfQuantity(keys.quantity)),
+        force_dof=_read_force(path, keys, where),
         is_reciprocal=keys.quantity in RECIPROCALS,
         unit=keys.unit or "",
         output_dofs=_parse_dofs(path, keys.output_dof, where),
@@ -575,6 +589,27 @@ def _read_source(path: Path, keys: FrfKeys) -> FrfSource:
         is_conjugated=keys.conjugated,
         level_N=keys.level,
     )
+
+
+def _read_force(path: Path, keys: FrfKeys, where: str) -> AnyDof | None:
+    if (keys.quantity == TRANSMISSIBILITY) != (keys.force_dof is not None):
+        problem = "a transmissibility, and no other quantity, needs 'force_dof': where the force acts"
+        raise FileFormatError(path, problem, where=where)
+    return None if keys.force_dof is None else _parse_dof(path, keys.force_dof, where)
+
+
+def _with_reference(source: FrfSource, sources: Sequence[FrfSource]) -> FrfSource:
+    """Find the file with the FRF of the reference of a transmissibility."""
+    if source.force_dof is None:
+        return source
+    ratio = read_frf_file(source)[0]
+    for other in sources:
+        if other.force_dof is None and any(
+            (label.output_dof, label.input_dof) == (ratio.input_dof, source.force_dof)
+            for label in _labels_of_source(other)
+        ):
+            return replace(source, reference=other, quantity=other.quantity)
+    raise no_reference(source, ratio)
 
 
 def _read_modes_source(path: Path, keys: ModesKeys) -> ModesSource:

@@ -12,6 +12,7 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats.registry import read_frf_file
+from frf_ipz.ingest.formats.transmissibility import over_force
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,6 +51,8 @@ def read_frf_source(source: FrfSource) -> tuple[MeasuredFrf, ...]:
         If it cannot be read, holds magnitudes only, or is conjugated.
     """
     frfs = [_check_coherence(_one_sided(_as_stated(frf))) for frf in read_frf_file(source)]
+    if source.reference is not None:
+        frfs = over_force(source, frfs, read_frf_source(source.reference))
     for frf in frfs:
         _refuse_magnitudes(frf)
     _refuse_conjugated(frfs)

@@ -40,6 +40,10 @@ class FrfSource:
         The file has the time convention exp(-i omega t).
     is_reciprocal : bool
         The file has force over response: the reciprocals of FRFs of `quantity`.
+    force_dof : AnyDof, optional
+        Where the force acts, for a file of transmissibilities: response over the response of a reference.
+    reference : FrfSource, optional
+        The file with the FRF of that reference.
     level_N : float, optional
         Amplitude of the excitation, N, where the test holds the same FRFs at several.
     variables : tuple of pairs of str
@@ -57,6 +61,8 @@ class FrfSource:
     sets: tuple[int, ...] = ()
     is_conjugated: bool = False
     is_reciprocal: bool = False
+    force_dof: AnyDof | None = None
+    reference: FrfSource | None = None
     level_N: float | None = None  # noqa: N815  a unit
     variables: tuple[tuple[str, str], ...] = ()
 

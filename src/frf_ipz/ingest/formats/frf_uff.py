@@ -19,7 +19,7 @@ from frf_ipz.ingest.formats.universal_file import (
     is_universal,
     read_functions,
 )
-from frf_ipz.ingest.units import frequency_factor, frf_factor, is_stated
+from frf_ipz.ingest.units import frequency_factor, frf_factor, is_stated, unit_ratio
 from frf_ipz.input_files import read_bytes
 from frf_ipz.quantities import FrfQuantity
 
@@ -137,12 +137,13 @@ def _make_frf(source: FrfSource, function: UniversalFunction, coherence: Univers
     node, direction, reference, reference_direction = function.ends
     output_dof = source.output_dof or _make_dof(source, function, node, direction, "response")
     input_dof = source.input_dof or _make_dof(source, function, reference, reference_direction, "reference")
-    _check_quantity(source, function, f"{output_dof} / {input_dof}")
+    if source.force_dof is None:
+        _check_quantity(source, function, f"{output_dof} / {input_dof}")
     unit, notes = _find_unit(source, function, output_dof, input_dof)
     unit = f"1/({unit})" if unit and source.is_reciprocal else unit
     order = np.argsort(function.x, kind="stable")
     frequency_hz = function.x[order] * _abscissa_factor(source, function)
-    values = function.values[order]
+    values = function.values[order] * _unit_of_ratio(source, function)
     is_finite = np.isfinite(values)
     left_out = ~is_finite & (frequency_hz == 0.0)
     if not (is_finite | left_out).all():
@@ -204,11 +205,21 @@ def _abscissa_factor(source: FrfSource, function: UniversalFunction) -> float:
         raise FileFormatError(source.path, str(error), where=f"data set {function.number}, abscissa") from None
 
 
+def _unit_of_ratio(source: FrfSource, function: UniversalFunction) -> float:
+    """Give the factor that a transmissibility has where its two responses are in two units."""
+    units = function.ordinate.unit, function.denominator.unit
+    ratio = unit_ratio(*units) if source.force_dof is not None and all(map(is_stated, units)) else None
+    if ratio is not None and np.isnan(ratio):
+        problem = f"is a ratio of '{units[0]}' over '{units[1]}', which is no transmissibility"
+        raise FileFormatError(source.path, problem, where=f"data set {function.number}")
+    return ratio or 1.0
+
+
 def _find_unit(
     source: FrfSource, function: UniversalFunction, output_dof: AnyDof, input_dof: AnyDof
 ) -> tuple[str, tuple[str, ...]]:
     """Return the unit that the file states: by its labels, else by its factors from SI; never SI against a label."""
-    if source.unit:
+    if source.unit or source.force_dof is not None:
         return "", ()
     numerator, denominator = function.ordinate.unit, function.denominator.unit
     directions = output_dof.direction, input_dof.direction
