@@ -28,6 +28,7 @@ ROLES = (  # of a column, by its name; the first that fits
     ("magnitude_db", re.compile(r"(mag|amp|abs|mod).*db|^db", re.IGNORECASE)),
     ("magnitude", re.compile(r"mag|amp|abs|modul", re.IGNORECASE)),
 )
+LABELS = ("output_dof", "input_dof")
 RATIO = re.compile(r"\(([^()]+)\)\s*\(([^()]+)\)")  # SignalCalc writes (m/s²)(N) for a ratio
 MOST_HEAD = 1 << 12  # bytes in which a binary file shows itself
 
@@ -98,6 +99,8 @@ def find_frf_columns(source: FrfSource) -> AnalyserColumns | None:
     try:
         layout = sniff(source.path)
     except FileFormatError:
+        return None
+    if any(label in fields for fields in layout.header for label in LABELS):  # a long table of many FRFs
         return None
     for fields in layout.header:
         words = [field for field in fields if field and not is_number(field)]
