@@ -83,6 +83,7 @@ from .identification.modal_fit import ModalFit as ModalFit
 from .identification.options import FitOptions as FitOptions
 from .identification.options import PinnedPole as PinnedPole
 from .identification.options import RejectedPole as RejectedPole
+from .identification.options import Stability as Stability
 from .identification.results.gains import estimate_gains as estimate_gains
 from .ingest.campaign import Channel as Channel
 from .ingest.campaign import Recording as Recording

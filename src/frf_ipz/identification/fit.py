@@ -41,6 +41,7 @@ from frf_ipz.identification.search.find_modes import (
 )
 from frf_ipz.identification.search.goodness_of_fit import assess_fit
 from frf_ipz.identification.search.split_half import SplitHalf, fit_halves, unconfirmed_reasons
+from frf_ipz.identification.stabilization import columns_of_modes
 from frf_ipz.identification.stated_modes import take_stated_modes
 from frf_ipz.modes import ModalParameters
 from frf_ipz.progress import Progress, silent
@@ -213,7 +214,8 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
         covariance=_root_covariance(errors, zeros, modes),
         residue_covariance=residue_covariance(errors, lines.powers, modes),
         value_std=value_std(errors, lines.s) * unit,
-        stabilization=fitted.start,
+        stabilization=columns_of_modes(fitted.start, natural_frequency_hz(fit.poles[modes]), options.stability),
+        stability=options.stability,
         decisions=_decisions(fitted, modes, unconfirmed),
         modes=mode_table(fit.poles[modes], fit.system.residues()[modes], fitted.goodness, modes, halves),
         misfit=misfit_frame.join(of_frfs, on="frf"),

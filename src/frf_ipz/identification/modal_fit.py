@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
@@ -11,6 +11,7 @@ from frf_ipz.arrays import BoolArray, FloatArray, require_shape
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.errors import ShapeError
 from frf_ipz.frf import FrfLabel
+from frf_ipz.identification.options import Stability
 from frf_ipz.identification.root_covariance import RootCovariance
 from frf_ipz.modes import ModalParameters
 from frf_ipz.rational import PoleResidueModel, ZeroSet, natural_frequency_hz
@@ -47,8 +48,8 @@ class ModalFit(Tabulated, Drawn):
     value_std : (n_used, n_frfs) array
         Standard deviation of the fitted FRF on the used lines, in units of the FRF (of the complex value's modulus).
     stabilization : DataFrame
-        One row a pole of the start: ``order, frequency_hz, damping_ratio, stable_frequency, stable_damping,
-        stable_shape, taken``.
+        One row a pole of the diagram: ``order, frequency_hz, damping_ratio, stable_frequency, stable_damping,
+        stable_shape``; ``taken`` as a start; ``mode``, the mode of the fit in whose column it stands, or 0.
     decisions : DataFrame
         What was added, dropped, pinned and rejected: ``frequency_hz, damping_ratio, action, reason``.
     modes : DataFrame
@@ -67,6 +68,8 @@ class ModalFit(Tabulated, Drawn):
         What the user has to know.
     unknown_scale : str
         ``none``, ``common`` or ``per_channel``, as the FRFs say: gains that are fitted once there is a model.
+    stability : Stability
+        Tolerances of the stabilisation diagram.
     modes_given : ModalParameters, optional
         Modes that were identified elsewhere: the fit of a test without FRFs has them in the place of residues.
 
@@ -114,6 +117,7 @@ class ModalFit(Tabulated, Drawn):
     warnings: tuple[str, ...] = ()
     unknown_scale: str = "none"
     modes_given: ModalParameters | None = None
+    stability: Stability = field(default_factory=Stability)
 
     @property
     def connections(self) -> tuple[FrfLabel, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from frf_ipz.errors import InputError
-from frf_ipz.option_types import Count, Frequency
+from frf_ipz.option_types import Count, Frequency, Positive
 from frf_ipz.toml_files import STRICT, check_values
 
 
@@ -66,6 +66,36 @@ class PinnedPole:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Stability:
+    """Tolerances of the stabilisation diagram: how near a pole is to one of the next lower order, relative.
+
+    Parameters
+    ----------
+    frequency : float
+        Of the natural frequency.
+    damping : float
+        Of the damping ratio.
+    vector : float
+        1 - MAC of the participation vectors.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.FitOptions(stability=frf_ipz.Stability(frequency=0.005)).stability.damping
+    0.05
+    """
+
+    __pydantic_config__ = STRICT
+
+    frequency: Positive = 0.01
+    damping: Positive = 0.05
+    vector: Positive = 0.02
+
+    def __post_init__(self) -> None:
+        check_values(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FitOptions:
     """How poles, residues and zeros are fitted.
 
@@ -84,6 +114,8 @@ class FitOptions:
     max_order : int, optional
         Highest model order of the stabilisation diagram that the start is taken from; without it chosen from the number
         of references. Too few lines in the band lower it.
+    stability : Stability
+        Tolerances of the stabilisation diagram. They are for whoever looks at it: the fit does not use them.
     delay : bool, optional
         true: fit a pure delay for each output channel too; false: none. Without it a delay that all responses share is
         tried, and taken where it explains most of what normal modes leave.
@@ -111,6 +143,7 @@ class FitOptions:
     strike: tuple[RejectedPole, ...] = ()
     modes: Literal["complex", "real"] = "complex"
     max_order: Count | None = None
+    stability: Stability = Stability()
     delay: bool | None = None
     gain: tuple[str, ...] = ()
 

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
+from frf_ipz.identification.options import Stability
 from frf_ipz.numerics.polyreference import denominator, denominator_roots, participation, reduced_normal_matrix
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
@@ -20,11 +21,10 @@ if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
     from frf_ipz.identification.measured_lines import MeasuredLines
 
-ORDERS = 10  # model orders in the diagram, evenly spaced
+MOST_ORDERS = 50  # of the diagram: orders are one apart, and two where there would be more
 TOP_POLES = 150  # poles of the highest order, conjugates counted: twice what the band of a test usually holds
 TOP_ORDER = (24, 100)  # bounds of the highest order
 LINES_PER_COEFFICIENT = 4  # lines that each coefficient needs
-STABLE_FREQUENCY, STABLE_DAMPING, STABLE_SHAPE = 5e-3, 0.6, 0.9  # agreement with the next lower order: relative, MAC
 OFFSET_BAND = 0.25  # lowest over highest frequency: above, the band alone is mapped onto the circle
 CIRCLE = 0.9  # part of the circle that such a band covers
 MAX_DAMPING = 0.25  # damping ratio of a pole that may be a mode
@@ -54,7 +54,9 @@ class _OrderPoles:
     shapes: ComplexArray
 
 
-def find_start_poles(frfs: FrfSet, lines: MeasuredLines, *, max_order: int | None = None) -> StartPoles:
+def find_start_poles(
+    frfs: FrfSet, lines: MeasuredLines, *, max_order: int | None = None, stability: Stability | None = None
+) -> StartPoles:
     """Find start poles by polyreference LSCF.
 
     Parameters
@@ -65,6 +67,8 @@ def find_start_poles(frfs: FrfSet, lines: MeasuredLines, *, max_order: int | Non
         The lines that are fitted.
     max_order : int, optional
         Highest model order.
+    stability : Stability, optional
+        Tolerances of the diagram; without them there is no diagram, and the table holds the start only.
 
     Returns
     -------
@@ -77,10 +81,11 @@ def find_start_poles(frfs: FrfSet, lines: MeasuredLines, *, max_order: int | Non
     top = max(2, min(top, 2 * len(lines.s) // (LINES_PER_COEFFICIENT * n_ref)))
     circle = _CircleMap.of_lines(lines)
     M = reduced_normal_matrix(circle.angles(lines.s), H, top, real=circle.real)
-    orders = np.unique(np.linspace(max(2, top // 4), top, ORDERS).astype(int))
-    diagram = [_poles_of_order(M, n_ref, int(order), circle, lines) for order in orders]
+    step = 1 if top <= MOST_ORDERS else 2
+    orders = [top] if stability is None else range(top, 1, -step)
+    diagram = [_poles_of_order(M, n_ref, order, circle, lines) for order in sorted(orders)]
     stable = [np.zeros((3, len(diagram[0].poles)), bool)]
-    stable += [_stability(low, high) for low, high in pairwise(diagram)]
+    stable += [_stability(low, high, stability or Stability()) for low, high in pairwise(diagram)]
     return StartPoles(poles=diagram[-1].poles, table=_diagram_table(diagram, stable))
 
 
@@ -143,17 +148,14 @@ def _poles_of_order(M: ComplexArray, n_ref: int, order: int, circle: _CircleMap,
     return _OrderPoles(order=order, poles=poles[selected], shapes=participation(D, z[selected]))
 
 
-def _agreement(poles: ComplexArray, lower: ComplexArray) -> tuple[BoolArray, BoolArray]:
-    """Mark the poles that agree with those of the lower order in frequency, and in damping too."""
-    frequency = np.abs(np.abs(poles)[:, None] - np.abs(lower)) < STABLE_FREQUENCY * np.abs(poles)[:, None]
-    damping = np.abs(lower.real - poles.real[:, None]) < STABLE_DAMPING * np.abs(poles.real)[:, None]
-    return frequency, frequency & damping
-
-
-def _stability(low: _OrderPoles, high: _OrderPoles) -> BoolArray:
-    frequency, damping = _agreement(high.poles, low.poles)
+def _stability(low: _OrderPoles, high: _OrderPoles, tolerance: Stability) -> BoolArray:
+    """Mark the poles that agree with one of the lower order in frequency, in damping too, and in the vector too."""
+    hertz, lower_hertz = np.abs(high.poles)[:, None], np.abs(low.poles)
+    ratio, lower_ratio = damping_ratio(high.poles)[:, None], damping_ratio(low.poles)
+    frequency = np.abs(hertz - lower_hertz) < tolerance.frequency * hertz
+    damping = frequency & (np.abs(ratio - lower_ratio) < tolerance.damping * ratio)
     assurance = np.abs(high.shapes.conj() @ low.shapes.T) ** 2
-    shape = damping & (assurance > STABLE_SHAPE)
+    shape = damping & (1 - assurance < tolerance.vector)
     return np.stack([frequency.any(axis=1), damping.any(axis=1), shape.any(axis=1)])
 
 
@@ -171,3 +173,30 @@ def _diagram_table(diagram: list[_OrderPoles], stable: list[BoolArray]) -> pd.Da
             "taken": np.arange(len(poles)) >= len(poles) - len(diagram[-1].poles),
         }
     )
+
+
+def columns_of_modes(table: pd.DataFrame, frequency_hz: FloatArray, tolerance: Stability) -> pd.DataFrame:
+    """Say of each pole of a diagram whether it stands in the column of a mode of the fit.
+
+    Parameters
+    ----------
+    table : DataFrame
+        The diagram.
+    frequency_hz : (n_modes,) array
+        Natural frequencies of the fit.
+    tolerance : Stability
+        How near a stable pole is to the mode.
+
+    Returns
+    -------
+    DataFrame
+        With the column ``mode``: number of the mode from 1, or 0.
+    """
+    hertz = table["frequency_hz"].to_numpy(float)
+    if not len(hertz) or not len(frequency_hz):
+        return table.assign(mode=np.zeros(len(hertz), np.int64))
+    distance = np.abs(hertz[:, None] / frequency_hz - 1)
+    nearest = distance.argmin(axis=1)
+    is_stable = table["stable_frequency"].to_numpy(bool) if "stable_frequency" in table else np.zeros(len(hertz), bool)
+    in_column = is_stable & (distance.min(axis=1) < tolerance.frequency)
+    return table.assign(mode=np.where(in_column, nearest + 1, 0))

@@ -71,6 +71,7 @@ def describe_stabilization(fit: ModalFit, frfs: FrfSet | None = None) -> Picture
     orders = fit.stabilization["order"].to_numpy(float)
     hertz = fit.model.natural_frequency_hz[: fit.n_modes]
     modes = listed([number(value, 5) for value in hertz], 20)
+    tolerance = fit.stability
     lines = VerticalLines(name="modes of the fit", colour=Role.INK, x=hertz, dash="dot")
     return Picture(
         name="stabilisation",
@@ -85,7 +86,10 @@ def describe_stabilization(fit: ModalFit, frfs: FrfSet | None = None) -> Picture
             ),
         ),
         x=frequency_axis(*fit.band_hz),
-        note="Grey curve: sum of all FRFs' magnitudes. Vertical lines: the modes of the fit. Ringed: taken as a start.",
+        note="Grey curve: sum of all FRFs' magnitudes. Vertical lines: the modes of the fit; squares: columns that "
+        f"lead to them. Stable against the next lower order: {100 * tolerance.frequency:g} % in frequency, "
+        f"{100 * tolerance.damping:g} % in damping, {100 * tolerance.vector:g} % in the vector (1 - MAC). Ringed: "
+        "where the fit started.",
         height_px=480,
     )
 
@@ -96,6 +100,9 @@ def _diagram(poles: pd.DataFrame) -> list[Layer]:
     flags = [poles[name].astype(bool).to_numpy() for name in ("stable_frequency", "stable_damping", "stable_shape")]
     level = np.cumprod(np.stack(flags).astype(int), axis=0).sum(axis=0)
     styles = [(level == rank, *style) for rank, style in enumerate(STABILITY)]
+    if "mode" in poles:
+        leads = (poles["mode"].to_numpy() > 0) & (level > 0)
+        styles.append((leads, "column of a mode of the fit", Role.INK, 0.9, "square", False, 11))
     styles.append((is_start, "taken", Role.BAD, 1.0, "circle", False, 14))
     return [
         Points(

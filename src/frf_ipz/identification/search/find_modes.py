@@ -114,7 +114,7 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
     progress(0.0, "choosing lines")
     lines = measured_lines(frfs, options)
     progress(0.05, "looking for first poles")
-    start = find_start_poles(frfs, lines, max_order=options.max_order)
+    start = find_start_poles(frfs, lines, max_order=options.max_order, stability=options.stability)
     terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(FIXED_POLES)
     lines = _with_noise_beside_peaks(lines, start.poles, terms)
     progress(0.2, "adding and dropping poles")

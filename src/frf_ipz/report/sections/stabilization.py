@@ -32,8 +32,9 @@ def build(run: Results) -> Section | None:
     n_taken = int(fit.stabilization["taken"].astype(bool).sum())
     orders = fit.stabilization["order"].nunique()
     lead = (
-        f"{counted(len(fit.stabilization), 'pole')} of {counted(orders, 'model order')}; {n_taken} of them were where "
-        f"the fit started, and {counted(fit.n_modes, 'mode')} remained."
+        f"{counted(len(fit.stabilization), 'pole')} of {counted(orders, 'model order')} up to "
+        f"{int(fit.stabilization['order'].max())}; {n_taken} of them were where the fit started, and "
+        f"{counted(fit.n_modes, 'mode')} remained."
     )
     blocks: list[Block] = [*run_figures(run, "stabilization")]
     blocks += [_decisions(fit.decisions)] if len(fit.decisions) else []
