@@ -34,6 +34,7 @@ EPS = float(np.finfo(float).eps)
 SPACING_M = 1.0  # between nodes in a row, where nobody knows their positions
 
 DOFS_SHOWN = 6
+MOST_PLACES = 8  # models whose DOFs are found by name at once
 HELD = ("auto", "keep")
 GENERALISED_LABEL = re.compile(r"\s*([0-9]{1,18})\s*:\s*[q0]\s*")
 GROUND = 0  # the node that does not move
@@ -680,14 +681,27 @@ class ReducedModel:
         InputError
             If the DOF is not among the expanded ones.
         """
-        try:
-            row = self.expanded_dofs.index(dof.unsigned)
-        except ValueError:
+        row = _places_of(self.expanded_dofs).get(dof.unsigned)
+        if row is None:
             raise InputError(
                 f"the reduced model does not know the {'DOF' if isinstance(dof, Dof) else 'port'} {dof.name}; add it "
                 "to [predict] points"
-            ) from None
+            )
         return np.asarray(dof.sign * self.expansion[row])
+
+
+_places: dict[int, tuple[tuple[AnyDof, ...], dict[AnyDof, int]]] = {}  # by identity: hashing thousands takes as long
+
+
+def _places_of(dofs: tuple[AnyDof, ...]) -> dict[AnyDof, int]:
+    """Where each DOF stands; known of the last few tuples, which are held so that no other takes their identity."""
+    known = _places.get(id(dofs))
+    if known is None:
+        if len(_places) >= MOST_PLACES:
+            _places.clear()
+        known = dofs, {dof: place for place, dof in reversed(tuple(enumerate(dofs)))}
+        _places[id(dofs)] = known
+    return known[1]
 
 
 def drawn_geometry(

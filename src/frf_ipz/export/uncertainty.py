@@ -167,7 +167,17 @@ def estimate_uncertainty_weights(
         )
     ports = choose_ports(labels, as_dofs(points), options or ExportOptions(), {}, updated.model.expanded_dofs)
     s = 2j * np.pi * np.asarray(frequency_hz, float)
-    errors = np.stack([_relative_error(updated, output.dof, ports.inputs, s) for output in ports.outputs], axis=1)
+    lowest = float(np.abs(s).min())
+    nominal = np.array([(updated.model.mass, updated.model.damping, updated.model.stiffness)])
+    updated_frfs = ModelEnsemble(matrices=nominal, lowest_rad_s=lowest)
+    member_frfs = ModelEnsemble(matrices=updated.ensemble, lowest_rad_s=lowest)
+    errors = np.stack(
+        [
+            _relative_error(updated, (updated_frfs, member_frfs), output.dof, ports.inputs, s)
+            for output in ports.outputs
+        ],
+        axis=1,
+    )
     weights = [_bound(np.asarray(frequency_hz, float), error) for error in errors.T]
     return UncertaintyWeights(
         output_names=tuple(output.name for output in ports.outputs),
@@ -178,11 +188,14 @@ def estimate_uncertainty_weights(
     )
 
 
-def _relative_error(updated: UpdatedModel, output: AnyDof, inputs: Sequence[AnyDof], s: ComplexArray) -> FloatArray:
-    model = updated.model
-    lowest = float(np.abs(s).min())
-    updated_frfs = ModelEnsemble(matrices=np.array([(model.mass, model.damping, model.stiffness)]), lowest_rad_s=lowest)
-    member_frfs = ModelEnsemble(matrices=updated.ensemble, lowest_rad_s=lowest)
+def _relative_error(
+    updated: UpdatedModel,
+    ensembles: tuple[ModelEnsemble, ModelEnsemble],
+    output: AnyDof,
+    inputs: Sequence[AnyDof],
+    s: ComplexArray,
+) -> FloatArray:
+    model, (updated_frfs, member_frfs) = updated.model, ensembles
     size, distance = np.zeros(len(s)), np.zeros((len(updated.ensemble), len(s)))
     for force in inputs:
         rows = model.row(output), model.row(force)

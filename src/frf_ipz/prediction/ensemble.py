@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+FRFS_AT_ONCE, LINES_AT_ONCE = 64, 128
 SOFT = 1e-3  # of the lowest line: frequency given to rigid-body modes, whose double poles at 0 have no residues
 
 
@@ -68,6 +73,32 @@ class ModelEnsemble:
         poles, right_vectors, left_vectors = self.roots
         residues = (output @ right_vectors) * (force @ left_vectors)
         return np.stack([(1 / (s[:, None] - p)) @ residue for p, residue in zip(poles, residues, strict=True)])
+
+    def receptances(
+        self, outputs: FloatArray, forces: FloatArray, s: ComplexArray
+    ) -> Iterator[tuple[slice, slice, ComplexArray]]:
+        """Evaluate many FRFs of every member, some lines of some FRFs at a time.
+
+        Parameters
+        ----------
+        outputs, forces : (n_frfs, r) array
+            Rows of sensors and excitations.
+        s : (n_lines,) complex array
+            rad/s.
+
+        Yields
+        ------
+        slice, slice, (m, lines, frfs) complex array
+            Lines, FRFs, and their values, m/N.
+        """
+        poles, right_vectors, left_vectors = self.roots
+        for first_frf in range(0, len(outputs), FRFS_AT_ONCE):
+            frfs = slice(first_frf, first_frf + FRFS_AT_ONCE)
+            residues = (outputs[frfs] @ right_vectors) * (forces[frfs] @ left_vectors)
+            for first_line in range(0, len(s), LINES_AT_ONCE):
+                lines = slice(first_line, first_line + LINES_AT_ONCE)
+                values = [(1 / (s[lines, None] - p)) @ residue.T for p, residue in zip(poles, residues, strict=True)]
+                yield lines, frfs, np.stack(values)
 
     def amplitudes(self, output: FloatArray, force: FloatArray, count: int) -> FloatArray:
         """Mass-normalised products of shapes at sensor and excitation.

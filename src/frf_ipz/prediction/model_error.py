@@ -46,25 +46,22 @@ class ModelError:
     ratio: FloatArray
     degrees: int
 
-    def draw(self, size: FloatArray, count: int) -> ComplexArray:
-        """Draw errors of an FRF.
+    def draw(self, count: int) -> ComplexArray:
+        """Draw errors, the same for all FRFs.
 
         Parameters
         ----------
-        size : (n_lines,) array
-            Sum of the moduli of the contributions of its modes.
         count : int
             Number of draws.
 
         Returns
         -------
-        (count, n_lines) complex array
-            To be added to the FRF.
+        (count,) complex array
+            Times `ratio` and the size of an FRF they are added to it.
         """
         rng = np.random.default_rng(SEED)
         normal = rng.standard_normal((count, 2)) @ np.array([1.0, 1.0j]) / np.sqrt(2.0)
-        student = normal / np.sqrt(rng.chisquare(self.degrees, count) / self.degrees)
-        return np.asarray(student[:, None] * (self.ratio * size))
+        return np.asarray(normal / np.sqrt(rng.chisquare(self.degrees, count) / self.degrees))
 
 
 def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEnsemble, s: ComplexArray) -> ModelError:
@@ -91,16 +88,20 @@ def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEn
     centre = as_ensemble(updated, ensemble.lowest_rad_s)
     lines_hz = np.abs(s) / (2 * np.pi)
     power = np.zeros(len(s))
-    for frf, label in enumerate(fit.labels):
-        output, force = updated.model.row(label.output_dof), updated.model.row(label.input_dof)
-        factor = s**label.quantity.power
-        value = centre.receptance(output, force, s)[0] * factor
-        members = ensemble.receptance(output, force, s) * factor
-        spread = np.var(members * scale.drawn(label, len(members))[:, None], axis=0)
-        noise = (np.interp(lines_hz, fit.frequency_hz, fit.value_std[:, frf]) / scale.gain(label)) ** 2
-        excess = np.maximum(np.abs(measured[:, frf] - value) ** 2 - spread - noise, 0.0)
-        size = frf_size(updated, label, s, centre)
-        power += np.divide(excess, size**2, out=np.zeros(len(s)), where=size > 0.0)
+    outputs, inputs = frf_rows(updated, fit.labels)
+    powers = np.array([label.quantity.power for label in fit.labels])
+    gains, sizes = scale.gains(fit.labels), frf_sizes(updated, fit.labels, s, centre)
+    values = {(lines.start, frfs.start): block[0] for lines, frfs, block in centre.receptances(outputs, inputs, s)}
+    for lines, frfs, block in ensemble.receptances(outputs, inputs, s):
+        factor = s[lines, None] ** powers[frfs]
+        drawn = np.stack([scale.drawn(label, len(block)) for label in fit.labels[frfs]], axis=1)[:, None]
+        spread = np.var(block * factor * drawn, axis=0)
+        std = [np.interp(lines_hz[lines], fit.frequency_hz, column) for column in fit.value_std[:, frfs].T]
+        noise = (np.stack(std, axis=1) / gains[frfs]) ** 2
+        missed = measured[lines, frfs] - values[lines.start, frfs.start] * factor
+        excess = np.maximum(np.abs(missed) ** 2 - spread - noise, 0.0)
+        size = sizes[lines, frfs] ** 2
+        power[lines] += np.divide(excess, size, out=np.zeros_like(size), where=size > 0.0).sum(axis=1)
     return ModelError(ratio=np.sqrt(power / len(fit.labels)), degrees=2 * _independent(fit.labels))
 
 
@@ -124,15 +125,34 @@ def as_ensemble(updated: UpdatedModel, lowest_rad_s: float) -> ModelEnsemble:
     return ModelEnsemble(matrices=matrices, lowest_rad_s=lowest_rad_s)
 
 
-def frf_size(updated: UpdatedModel, label: FrfLabel, s: ComplexArray, centre: ModelEnsemble) -> FloatArray:
-    """Add up the moduli of the contributions of all modes to an FRF.
+def frf_rows(updated: UpdatedModel, labels: Sequence[FrfLabel]) -> tuple[FloatArray, FloatArray]:
+    """Rows of sensors and excitations in a model.
 
     Parameters
     ----------
     updated : UpdatedModel
         The updated model.
-    label : FrfLabel
-        Which FRF.
+    labels : sequence of FrfLabel
+        Which FRFs.
+
+    Returns
+    -------
+    outputs, inputs : (n_frfs, r) array
+        Motion for unit motions of the retained DOFs.
+    """
+    outputs = np.array([updated.model.row(label.output_dof) for label in labels])
+    return outputs, np.array([updated.model.row(label.input_dof) for label in labels])
+
+
+def frf_sizes(updated: UpdatedModel, labels: Sequence[FrfLabel], s: ComplexArray, centre: ModelEnsemble) -> FloatArray:
+    """Add up the moduli of the contributions of all modes to each FRF.
+
+    Parameters
+    ----------
+    updated : UpdatedModel
+        The updated model.
+    labels : sequence of FrfLabel
+        Which FRFs.
     s : (n_lines,) complex array
         Lines, rad/s.
     centre : ModelEnsemble
@@ -140,14 +160,16 @@ def frf_size(updated: UpdatedModel, label: FrfLabel, s: ComplexArray, centre: Mo
 
     Returns
     -------
-    (n_lines,) array
+    (n_lines, n_frfs) array
         In the unit of the FRF; no less than its modulus.
     """
     squares, shapes = centre.modes[0][0], centre.modes[1][0]
     damping = np.einsum("ir,ij,jr->r", shapes, updated.model.damping, shapes)
-    products = (updated.model.row(label.output_dof) @ shapes) * (updated.model.row(label.input_dof) @ shapes)
-    contributions = np.abs(products) / np.abs(s[:, None] ** 2 + s[:, None] * damping + squares)
-    return np.asarray(contributions.sum(axis=1) * np.abs(s) ** label.quantity.power)
+    outputs, inputs = frf_rows(updated, labels)
+    products = np.abs((outputs @ shapes) * (inputs @ shapes))
+    powers = np.array([label.quantity.power for label in labels])
+    by_mode = 1 / np.abs(s[:, None] ** 2 + s[:, None] * damping + squares)
+    return np.asarray((by_mode @ products.T) * np.abs(s[:, None]) ** powers)
 
 
 def _independent(labels: Sequence[FrfLabel]) -> int:

@@ -20,7 +20,7 @@ from frf_ipz.frf import FrfLabel, Measured, require_measured
 from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.prediction.advice import explain_wide_band, wide_bands
 from frf_ipz.prediction.ensemble import ModelEnsemble
-from frf_ipz.prediction.model_error import as_ensemble, estimate_model_error, frf_size
+from frf_ipz.prediction.model_error import as_ensemble, estimate_model_error, frf_rows, frf_sizes
 from frf_ipz.prediction.prediction import Prediction
 from frf_ipz.prediction.zeros import predicted_zeros
 from frf_ipz.updating.updated_model import UpdatedModel
@@ -161,11 +161,14 @@ def _magnitude_bands(
         if isinstance(measured, ModalFit) and measured.labels:
             error = estimate_model_error(measured, updated, ensemble, s)
         centre = as_ensemble(updated, ensemble.lowest_rad_s)
-        for number, label in enumerate(labels):
-            output, force = updated.model.row(label.output_dof), updated.model.row(label.input_dof)
-            values = ensemble.receptance(output, force, s) * s**label.quantity.power
-            if error is not None:
-                values = values + error.draw(frf_size(updated, label, s, centre), len(values))
-            values = values * abs(updated.scale.gain(label)) * updated.scale.drawn(label, len(values))[:, None]
-            bands[:, :, number] = np.quantile(np.abs(values), BAND, axis=0)
+        sizes = frf_sizes(updated, labels, s, centre) if error is not None and labels else None
+        gains, powers = np.abs(updated.scale.gains(tuple(labels))), np.array([label.quantity.power for label in labels])
+        for lines, frfs, block in ensemble.receptances(*frf_rows(updated, labels), s):
+            values = block * s[lines, None] ** powers[frfs]
+            if error is not None and sizes is not None:
+                errors = error.draw(len(values))[:, None, None]
+                values = values + errors * (error.ratio[lines, None] * sizes[lines, frfs])
+            drawn = [updated.scale.drawn(label, len(values)) for label in labels[frfs]]
+            values = values * gains[frfs] * np.stack(drawn, axis=1)[:, None]
+            bands[:, lines, frfs] = np.quantile(np.abs(values), BAND, axis=0)
     return bands[0], bands[1]
