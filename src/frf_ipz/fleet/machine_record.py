@@ -186,7 +186,8 @@ def _poles(fit: ModalFit, pairs: Pairs | None) -> Roots:
 def _zeros(fit: ModalFit, pairs: Pairs | None) -> Roots:
     frame = zero_table(fit)
     table = frame.to_pydict()
-    known = np.flatnonzero(np.array(table["identifiable"], bool) & (np.array(table["kind"]) == "complex"))
+    is_known = np.array(table["identifiable"], bool) & (np.array(table["kind"]) == "complex")
+    known = np.flatnonzero(is_known & (np.array(table["frequency_hz"], float) > 0))
     frfs = [f"{out} / {force}" for out, force in zip(table["output_dof"], table["input_dof"], strict=True)]
     frequency_hz, damping_ratio, *std = (np.array(column, float)[known] for column in _numbers(frame))
     return Roots(
