@@ -101,10 +101,8 @@ class UnitSystem:
         if isinstance(units, str):
             if units not in SYSTEMS:
                 advice = did_you_mean(units, SYSTEMS)
-                raise InputError(
-                    f'\'{units}\' is no system of units; {advice}; or a table {{ length = "mm", mass = "t", time = '
-                    '"s" }'
-                )
+                table = '{ length = "mm", mass = "t", time = "s" }'
+                raise InputError(f"'{units}' is no system of units, nor a table such as {table}; {advice}")
             return cls._of_factors(units, SYSTEMS[units])
         unknown = [key for key in units if key not in QUANTITIES]
         if unknown:

@@ -4,12 +4,14 @@ A profile with more examples looks longer: ``HYPOTHESIS_PROFILE=long pytest test
 """
 
 import tempfile
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import sparse
 
 import frf_ipz
 from data_sets import data_set
@@ -17,6 +19,9 @@ from fe_models import BEAM_TEXT, LUMPED_TEXT
 from frf_ipz.errors import FrfIpzError
 from frf_ipz.fe.matrices.dof_table import read_dof_table
 from frf_ipz.fe.matrices.formats.matrix_market import read_matrix_market
+from frf_ipz.fe.matrices.node_positions import read_positions
+from frf_ipz.fe.matrices.registry import read_matrix
+from frf_ipz.fe.matrices.row_tables import read_rows
 from frf_ipz.fe.matrices.stored import MatrixRequest
 from frf_ipz.fe.model_file import read_model
 from frf_ipz.ingest.campaign_file import read_test
@@ -63,6 +68,19 @@ def read_columns(path):
     return frf_ipz.read_frfs(path, output="1:+z", input="2:+z", columns=columns, skip_rows=1)
 
 
+def read_any_matrix(path):
+    return read_matrix(MatrixRequest(path=path, what="stiffness"))
+
+
+HARWELL_BOEING = """K of a chain
+             4             1             1             2             0
+RSA                        3             3             5             0
+(4I4)           (5I4)           (3E20.8)
+   1   3   5   6
+   1   2   2   3   3
+      2.00000000E+00     -1.00000000E+00      2.00000000E+00
+     -1.00000000E+00      1.00000000E+00
+"""
 PARSERS = {
     "recording.csv": (f"time,force,acc\ns,N,m/s^2\n{ROWS}", read_recording),
     "stamped.csv": (f"sep=;\nDate;force;acc\n{STAMPED}", read_recording),
@@ -79,6 +97,12 @@ PARSERS = {
         lambda path: read_matrix_market(MatrixRequest(path=path, what="stiffness", order=3, ordered_by="dofs.csv")),
     ),
     "dofs.csv": (DOFS, read_dof_table),
+    "job.sti": ("1 1 2.0e3\n2 1 -1.0D3\n2 2 1.0e3\n" * 2, read_any_matrix),
+    "labels.mtx": ("** K\n1,1,1,1, 2.0e3\n2,1,1,1,-1.0e3\n2,1,2,1,1.0e3\n-1,0,2,1,1.0\n", read_any_matrix),
+    "K.hb": (HARWELL_BOEING, read_any_matrix),
+    "job.dof": ("1.1\n1.2\n2.1\n", read_rows),
+    "deck.inp": ("*NODE\n1, 0., 0., 0.\n2, 1.5, 0.\n*ELEMENT\n1,1,2\n", read_positions),
+    "K.npz": (None, read_any_matrix),
     "test.toml": (TEST, read_test),
     "beam.toml": (BEAM_TEXT, read_model),
     "lumped.toml": (LUMPED_TEXT, read_model),
@@ -87,6 +111,19 @@ PARSERS = {
     "run.json": ('{"frf_ipz_version": "0.3.0", "name": "x", "stages": {"fit": {"files": ["poles.parquet"]}}}', None),
     "stage.bin": (None, read_stage_file),
 }
+
+
+def valid_bytes(name):
+    """Give the bytes of a file as it should be."""
+    text = PARSERS[name][0]
+    if text is not None:
+        return text.encode()
+    stream = BytesIO()
+    if name == "K.npz":
+        sparse.save_npz(stream, sparse.csr_array([[2.0, -1.0], [-1.0, 1.0]]), compressed=False)
+    else:
+        return stage_file()
+    return stream.getvalue()
 
 
 def parse(name, data):
@@ -136,14 +173,13 @@ def test_what_is_valid_is_read(name):
         with pytest.raises(FrfIpzError, match="no file fits"):  # its recordings are not there
             parse(name, text.encode())
     else:
-        parse(name, stage_file() if text is None else text.encode())
+        parse(name, valid_bytes(name))
 
 
 @pytest.mark.parametrize("name", PARSERS)
 @given(data=st.data())
 def test_anything_is_read_or_refused(name, data):
-    text = PARSERS[name][0]
-    valid = stage_file() if text is None else text.encode()
+    valid = valid_bytes(name)
     content = data.draw(st.one_of(edits.map(lambda changes: edited(valid, changes)), st.binary(max_size=200)))
     refusal = refusal_of(name, content)
     assert refusal is None or name in refusal  # the file is named

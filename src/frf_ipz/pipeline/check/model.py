@@ -63,10 +63,14 @@ def _describe_size(model: StructuralModel) -> str:
 
 def _describe_frequencies(model: StructuralModel) -> str:
     try:
-        modes = solve_modes(model, n_modes=min(FREQUENCIES + RIGID_MOTIONS, len(model.dofs)))
+        modes = solve_modes(model, n_modes=min(FREQUENCIES + RIGID_MOTIONS, model.n_modes))
     except NumericalError as error:
         return f"cannot be computed: {error}"
     elastic = modes.natural_frequency_hz[modes.natural_frequency_hz > 0]
-    rigid = len(modes.natural_frequency_hz) - len(elastic)
     text = " ".join(number(hz) for hz in elastic[:FREQUENCIES]) + " Hz"
+    unstable = -2 * np.pi * modes.natural_frequency_hz[modes.natural_frequency_hz < 0]
+    rigid = len(modes.natural_frequency_hz) - len(elastic) - len(unstable)
+    if len(unstable):
+        rates = ", ".join(f"+-{number(float(rate))}" for rate in np.sort(unstable))
+        text += f", besides {counted(len(unstable), 'mode')} of negative stiffness with poles at {rates} rad/s"
     return f"{text}, besides {counted(rigid, 'rigid-body motion')}" if rigid else text

@@ -17,12 +17,15 @@ MODES_COLUMNS = frozenset({"mode", "frequency_hz", "damping_ratio", "dof", "real
 CSV = ".csv"
 TEXT = (".txt", ".dat", ".asc", ".tsv", ".prn", ".xlsx")  # may be a table, and may be anything else
 OTHER = (".toml", ".py", ".m", ".md", ".json", ".html", ".mtx")  # settings, programs, results
+DECKS = (".sti", ".mas", ".dof", ".full", ".inp", ".bdf", ".op4", ".op2", ".asm", ".pch")  # of FE programs
+ARRAYS = (".npz", ".npy")  # matrices where they are called so, else recordings or FRFs
 FEWEST_ROWS = 16  # of a recording
 DOF_COLUMNS = frozenset({"node", "direction"})
 UNIVERSAL = (".unv", ".uff")
 MATRIX = re.compile(
     r"^(?:(?P<stiffness>k|stiff\w*)|(?P<mass>m|mass)|(?P<damping>[bcd]|damp\w*))(?:[_-](?P<group>.+))?$", re.I
 )
+KINDS_BY_SUFFIX = {".sti": ("stiffness",), ".mas": ("mass",), ".full": ("mass", "stiffness")}
 KEPT_ASIDE = re.compile(r"reference|aside|poi([_-]|$)|truth|validation", re.IGNORECASE)
 
 
@@ -41,7 +44,9 @@ class FolderContents:
     modes : Path, optional
         Modes that were identified elsewhere.
     dof_table : Path, optional
-        ``dofs.csv``.
+        ``dofs.csv``, or CalculiX's ``.dof``.
+    nodes : Path, optional
+        The deck of a model whose rows have no positions.
     matrices : dict of str to Path
         ``stiffness``, ``mass``, ``damping``, as far as they are there.
     groups : dict of str to dict of str to Path
@@ -56,6 +61,7 @@ class FolderContents:
     references: tuple[Path, ...]
     modes: Path | None
     dof_table: Path | None
+    nodes: Path | None
     matrices: dict[str, Path]
     groups: dict[str, dict[str, Path]]
     unread: dict[Path, str]
@@ -63,7 +69,8 @@ class FolderContents:
     @property
     def has_matrices(self) -> bool:
         """There is what a model of matrices needs."""
-        return {"mass", "stiffness"} <= set(self.matrices) and self.dof_table is not None
+        names_rows = any(path.suffix.lower() == ".full" for path in self.matrices.values())
+        return {"mass", "stiffness"} <= set(self.matrices) and (self.dof_table is not None or names_rows)
 
     def name(self, path: Path) -> str:
         """Name a file as a TOML file in the folder does."""
@@ -97,7 +104,7 @@ def look_into(folder: Path) -> FolderContents:
     found: dict[str, list[Path]] = {"recording": [], "frf": []}
     unread: dict[Path, str] = {}
     for path in files:
-        if path in {*dof_tables, *modes} or path.suffix.lower() in OTHER:
+        if path in {*dof_tables, *modes} or path.suffix.lower() in {*OTHER, *DECKS} or _is_array_of_model(path):
             continue
         try:
             kind = _kind(path)
@@ -116,13 +123,16 @@ def look_into(folder: Path) -> FolderContents:
         problem = "holds no recordings and no FRFs in a format that is read (CSV, text, UFF, MATLAB, HDF5, ...)"
         raise InputError(f"{folder}: {problem}; put them there, one file an impact, then run init again{hint}")
     matrices, groups = _sort_matrices(files)
+    calculix = next((path for path in files if path.suffix.lower() == ".dof"), None)
+    deck = calculix.with_suffix(".inp") if calculix is not None and not dof_tables else None
     return FolderContents(
         folder=folder,
         recordings=recordings,
         frfs=frfs,
         references=references,
         modes=next(iter(modes), None),
-        dof_table=next(iter(dof_tables), None),
+        dof_table=next(iter(dof_tables), calculix),
+        nodes=deck if deck in files else None,
         matrices=matrices,
         groups=groups,
         unread=unread,
@@ -158,6 +168,10 @@ def _is_table(path: Path) -> bool:
     return layout.n_columns > 1 and len(layout.rows) >= FEWEST_ROWS
 
 
+def _is_array_of_model(path: Path) -> bool:
+    return path.suffix.lower() in ARRAYS and MATRIX.match(path.stem) is not None
+
+
 def _is_hidden(path: Path, folder: Path) -> bool:
     return any(part.startswith(".") for part in path.relative_to(folder).parts)
 
@@ -171,7 +185,10 @@ def _sort_matrices(files: list[Path]) -> tuple[dict[str, Path], dict[str, dict[s
     matrices: dict[str, Path] = {}
     groups: dict[str, dict[str, Path]] = {}
     for path in files:
-        found = MATRIX.match(path.stem) if path.suffix.lower() == ".mtx" else None
+        suffix = path.suffix.lower()
+        for kind in KINDS_BY_SUFFIX.get(suffix, ()):
+            matrices.setdefault(kind, path)
+        found = MATRIX.match(path.stem) if suffix == ".mtx" or _is_array_of_model(path) else None
         if found is None:
             continue
         kind = next(name for name in ("stiffness", "mass", "damping") if found[name])

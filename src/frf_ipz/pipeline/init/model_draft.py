@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from frf_ipz.pipeline.init.folder_contents import KINDS_BY_SUFFIX
 from frf_ipz.pipeline.init.text import HEAD, guessed, quoted
 
 if TYPE_CHECKING:
@@ -63,9 +64,12 @@ def draft_model(contents: FolderContents) -> str:
         Text of ``model.toml``.
     """
     name = quoted(contents.folder.resolve().name)
-    if contents.dof_table is None or not contents.has_matrices:
+    if not contents.has_matrices:
         return "# Written by 'frf-ipz init': a skeleton." + SKELETON.format(name=name)
-    lines = [HEAD, "[model]", 'kind = "matrices"', f"name = {name}", "", "[damping]"]
+    lines = [HEAD, "[model]", 'kind = "matrices"', f"name = {name}"]
+    if any(path.suffix.lower() in KINDS_BY_SUFFIX for path in contents.matrices.values()):
+        lines.append(guessed('units = "SI"', "what the deck is in: SI, mm-t-s, mm-kg-ms or in-lbf-s"))
+    lines += ["", "[damping]"]
     lines.append(guessed("modal_ratio = 0.01", "one ratio for all modes, or a list; updated where measured"))
     lines += ["", "[matrices]"]
     lines += [
@@ -73,7 +77,10 @@ def draft_model(contents: FolderContents) -> str:
         for kind, unit in (("mass", "in kg"), ("stiffness", "in N/m"), ("damping", "in N s/m"))
         if kind in contents.matrices
     ]
-    lines.append(f"dofs = {quoted(contents.name(contents.dof_table))}")
+    if contents.dof_table is not None:
+        lines.append(f"dofs = {quoted(contents.name(contents.dof_table))}")
+    if contents.nodes is not None:
+        lines.append(f"nodes = {quoted(contents.name(contents.nodes))}")
     for group, parts in contents.groups.items():
         lines += ["", "[[matrices.group]]", f"name = {quoted(group)}"]
         lines += [f"{kind} = {quoted(contents.name(parts[kind]))}" for kind in ("stiffness", "mass") if kind in parts]

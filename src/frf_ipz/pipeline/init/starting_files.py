@@ -94,7 +94,7 @@ def _write(path: Path, text: str) -> bool:
 def _taken_for(contents: FolderContents) -> list[str]:
     texts = []
     if contents.has_matrices:
-        names = [contents.name(path) for path in contents.matrices.values()]
+        names = [contents.name(path) for path in dict.fromkeys(contents.matrices.values())]
         texts.append(f"{', '.join(names)}: matrices of the FE model")
     elif contents.matrices:
         missing = [what for what in ("mass", "stiffness") if what not in contents.matrices]
