@@ -163,6 +163,8 @@ def calls():
             {"fit": g.fit, "reduced_model": g.reduced_model},
             {"pairs": [3], "fe_model": [3], "options": [{}, frf_ipz.UpdateOptions(method="guess")], "basis": [3]},
         ),
+        "write_frfs": ({"frfs": g.frfs, "path": "x.unv"}, {"path": ["x.txt"]}),
+        "write_modes": ({"fit": g.fit, "path": "x.csv"}, {"path": ["x.txt"]}),
         "write_state_space": ({"system": 3, "path": "x.json"}, {"path": ["x.txt"]}),
         "FrfSet.from_arrays": (
             FRFS,
