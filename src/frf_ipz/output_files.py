@@ -128,6 +128,25 @@ def write_text(path: Path, text: str, *, newline: str = "\n") -> None:
         target.write_text(text, encoding="utf-8", errors="backslashreplace", newline=newline)
 
 
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    content : bytes
+        What it holds.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    with replacing(path) as target:
+        target.write_bytes(content)
+
+
 def move(source: Path, target: Path) -> None:
     """Let a file take the place of another in one step.
 

@@ -30,7 +30,6 @@ ALLOWED = {
     "ingest/formats/spreadsheet.py": {"archive.open"},  # a part of what the door has read
     "show/app.py": {"json.loads"},  # a request
     "fe/matrices/formats/matrix_market.py": {"io.mmread"},  # of bytes that are checked
-    "fe/matrices/formats/ansys_full.py": {"np.load"},  # of what its own process has just written
     "ingest/formats/frf_uff.py": {"pyuff.UFF"},  # takes a path; the registry has read its head by the door
 }
 

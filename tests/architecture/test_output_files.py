@@ -18,6 +18,7 @@ FUNCTIONS = {
     "dump",
     "copyfile",
 }
+GIVE_TEXT = {"to_csv"}  # where no file is named
 OWN = "output_files.py"
 
 
@@ -32,7 +33,7 @@ def writes(call):
         return (owner if owner is not None else call.args[0]) if writing else None
     if name == "savefig":
         return call.args[0]
-    if name in METHODS and owner is not None:
+    if name in METHODS and owner is not None and (call.args or name not in GIVE_TEXT):
         return owner
     if name in FUNCTIONS and owner is not None and ast.unparse(owner) in {"np", "pq", "json", "shutil", "scipy.io"}:
         return call.args[1] if name in {"write_table", "dump", "copyfile"} else call.args[0]

@@ -6,7 +6,6 @@ of all ports, so that a state space may have other inputs and outputs than the o
 
 from __future__ import annotations
 
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile
@@ -20,7 +19,7 @@ from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.export.options import ExportOptions
 from frf_ipz.export.ports import choose_ports_of_model
 from frf_ipz.export.state_space import realise_state_space, to_control
-from frf_ipz.input_files import read_bytes
+from frf_ipz.numpy_files import read_numpy
 from frf_ipz.output_files import replacing
 from frf_ipz.structure import ReducedModel
 
@@ -121,8 +120,8 @@ def read_updated_model(path: str | Path) -> ReducedModel:
     """
     path = require_file(path)
     try:
-        with np.load(BytesIO(read_bytes(path)), allow_pickle=False) as content:
-            arrays = {name: content[name] for name in REDUCED_MODEL}
+        content = read_numpy(path, only="").arrays
+        arrays = {name: content[name] for name in REDUCED_MODEL}
         rigid = np.asarray(arrays["rigid"], float)
         units = zip(arrays["expanded_dofs"].tolist(), arrays["units"].tolist(), strict=True)
         expanded = tuple(_dof_of(str(name), str(unit)) for name, unit in units)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from frf_ipz.report.section import Section
     from frf_ipz.runs.results import Results
 
+UINT16 = np.dtype(np.uint16).newbyteorder("little")
 LEAST_PACKED = 24  # shorter arrays are written as numbers
 MANY_FRFS = 100  # above which the page holds numbers of 16 bits
 STEPS = 65534  # between the least and the largest number of 16 bits; one more stands for no number
@@ -159,7 +160,7 @@ def short_numbers(array: np.ndarray[Any, Any]) -> dict[str, Any]:
     with np.errstate(invalid="ignore"):  # NaN stays NaN, and is told apart below
         scaled = (np.log(values) if is_log else values) - low
     whole = np.where(np.isfinite(scaled), np.round(scaled / step), STEPS + 1)
-    data = base64.b64encode(whole.astype("<u2").tobytes()).decode("ascii")
+    data = base64.b64encode(whole.astype(UINT16).tobytes()).decode("ascii")
     return {"bytes": data, "low": low, "step": step, **({"log": True} if is_log else {})}
 
 

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from frf_ipz.output_files import replacing
 
 
 def main() -> None:
@@ -23,7 +26,8 @@ def main() -> None:
         if matrix is not None:
             entries = matrix.tocoo()
             arrays |= {f"{name}_rows": entries.row, f"{name}_columns": entries.col, f"{name}_values": entries.data}
-    np.savez(target, **arrays)
+    with replacing(Path(target)) as beside, beside.open("wb") as stream:
+        np.savez(stream, **arrays)
 
 
 if __name__ == "__main__":

@@ -14,8 +14,10 @@ import numpy as np
 
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
 from frf_ipz.fe.matrices.dof_table import DofTable
-from frf_ipz.fe.matrices.stored import MOST_BYTES, errors_of_library, import_library
+from frf_ipz.fe.matrices.stored import MOST_BYTES
+from frf_ipz.foreign_errors import errors_of_reader, import_reader
 from frf_ipz.input_files import read_bytes
+from frf_ipz.output_files import write_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,11 +49,11 @@ def read_uset(path: Path) -> DofTable:
         If it cannot be read, or pyyeti is not installed.
     """
     is_binary = path.suffix.lower() == ".op2"
-    n2p = import_library(path, "pyyeti.nastran.n2p", kind=KIND, extra=EXTRA)
-    reader = import_library(path, "pyyeti.nastran." + ("op2" if is_binary else "bulk"), kind=KIND, extra=EXTRA)
-    with TemporaryDirectory() as folder, errors_of_library(path, KIND):  # pyyeti takes paths
+    n2p = import_reader(path, "pyyeti.nastran.n2p", kind=KIND, extra=EXTRA)
+    reader = import_reader(path, "pyyeti.nastran." + ("op2" if is_binary else "bulk"), kind=KIND, extra=EXTRA)
+    with TemporaryDirectory() as folder, errors_of_reader(path, KIND):  # pyyeti takes paths
         copy = Path(folder) / path.name
-        copy.write_bytes(read_bytes(path, most_bytes=MOST_BYTES))
+        write_bytes(copy, read_bytes(path, most_bytes=MOST_BYTES))
         if not is_binary:
             return _table_of_super_element(copy, path, reader)
         with reader.OP2(str(copy)) as file:
@@ -69,7 +71,7 @@ def read_uset(path: Path) -> DofTable:
 def _table_of_super_element(copy: Path, path: Path, reader: Any) -> DofTable:  # noqa: ANN401 - a module
     punch = path.with_suffix(".pch")
     if punch.is_file():
-        copy.with_suffix(".pch").write_bytes(read_bytes(punch, most_bytes=MOST_BYTES))
+        write_bytes(copy.with_suffix(".pch"), read_bytes(punch, most_bytes=MOST_BYTES))
     uset, _, *rows = reader.asm2uset(str(copy), try_rdextrn="pv_only", follow_includes=False)
     labels = _labels(uset)
     wanted = np.arange(len(labels))

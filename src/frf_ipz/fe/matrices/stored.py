@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import warnings
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.errors import FileFormatError, FrfIpzError
+from frf_ipz.errors import FileFormatError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from frf_ipz.arrays import FloatArray, Matrix
@@ -229,76 +226,6 @@ def both_triangles(matrix: Matrix, path: Path) -> StoredMatrix:
     full: Any = matrix + beside.T
     note = f"{path.name}: only one triangle stands there; it is taken for half of a symmetric matrix"
     return StoredMatrix(matrix=sparse.csr_array(full), notes=(note,))
-
-
-@contextmanager
-def errors_of_library(path: Path, kind: str) -> Iterator[None]:
-    """Turn what a library raises on a file into one error that names it.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    kind : str
-        What it should be, such as ``a MATLAB file``.
-
-    Yields
-    ------
-    None
-        While the library reads.
-
-    Raises
-    ------
-    FileFormatError
-        In the place of any error that is none of the package.
-    """
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    except FrfIpzError:
-        raise
-    except MemoryError:
-        raise FileFormatError(path, f"does not fit into memory as {kind}; export a smaller model") from None
-    except Exception as error:
-        said = " ".join(str(error).split())[:LONGEST] or type(error).__name__
-        raise FileFormatError(
-            path, f"cannot be read as {kind}: it is cut off, damaged, or something else ({said}); export it again"
-        ) from None
-
-
-def import_library(path: Path, module: str, *, kind: str, extra: str) -> Any:  # noqa: ANN401 - a module
-    """Import the library that reads a kind of file, or say how it is installed.
-
-    Parameters
-    ----------
-    path : Path
-        The file that needs it.
-    module : str
-        Name of the library.
-    kind : str
-        What the file is, such as ``a Nastran file``.
-    extra : str
-        The extra of the package that installs it.
-
-    Returns
-    -------
-    module
-        The library.
-
-    Raises
-    ------
-    FileFormatError
-        If it is not installed: names the extra.
-    """
-    try:
-        return import_module(module)
-    except ImportError:
-        raise FileFormatError(
-            path,
-            f"is {kind}, which {module.partition('.')[0]} reads; it is not installed: run pip install "
-            f"'frf_ipz[{extra}]', or export Matrix Market",
-        ) from None
 
 
 def positions_of_rows(dofs: Sequence[Dof], positions: FloatArray) -> dict[int, tuple[float, ...]]:

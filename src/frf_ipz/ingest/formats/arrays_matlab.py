@@ -16,8 +16,8 @@ from scipy import sparse
 from scipy.io.matlab import MatlabFunction, MatlabOpaque
 
 from frf_ipz.errors import FileFormatError
+from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.ingest.formats.file_arrays import MOST_EXPANDED, ArrayFormat, FileArrays
-from frf_ipz.ingest.formats.foreign_errors import errors_of_reader
 from frf_ipz.ingest.formats.hdf5_tree import SIGNATURE, Hdf5Tree, open_tree
 from frf_ipz.ingest.formats.text_layout import read_head
 from frf_ipz.input_files import require_regular_file

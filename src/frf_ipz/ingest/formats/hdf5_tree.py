@@ -10,8 +10,8 @@ import lazy_loader
 import numpy as np
 
 from frf_ipz.errors import FileFormatError
+from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.ingest.formats.file_arrays import require_size
-from frf_ipz.ingest.formats.foreign_errors import errors_of_reader
 from frf_ipz.input_files import open_input
 
 if TYPE_CHECKING:

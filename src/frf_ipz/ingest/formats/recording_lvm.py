@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import lazy_loader
 import numpy as np
 
-from frf_ipz.ingest.formats.foreign_errors import errors_of_reader
+from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.ingest.formats.signal_table import SAME_RATE, Signal, SignalFormat, SignalTable, even_times
 from frf_ipz.ingest.formats.text_layout import decode, name_and_unit
 from frf_ipz.input_files import read_bytes

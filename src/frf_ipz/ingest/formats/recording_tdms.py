@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from frf_ipz.foreign_errors import errors_of_reader, import_reader
 from frf_ipz.ingest.formats.file_arrays import require_size
-from frf_ipz.ingest.formats.foreign_errors import errors_of_reader, import_reader
 from frf_ipz.ingest.formats.signal_table import Signal, SignalFormat, SignalTable, even_times
 from frf_ipz.input_files import read_bytes
 

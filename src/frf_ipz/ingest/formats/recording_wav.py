@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.io import wavfile
 
-from frf_ipz.ingest.formats.foreign_errors import errors_of_reader
+from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.ingest.formats.signal_table import Signal, SignalFormat, SignalTable, even_times
 from frf_ipz.input_files import read_bytes
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import lazy_loader
 
 from frf_ipz.errors import FileFormatError
+from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.ingest.formats.file_arrays import require_size
-from frf_ipz.ingest.formats.foreign_errors import errors_of_reader
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import subprocess
 import sys
 from functools import lru_cache
@@ -11,13 +10,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
 from scipy import sparse
 
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.matrices.stored import MOST_BYTES, MatrixFormat, MatrixRequest, StoredMatrix, both_triangles
 from frf_ipz.input_files import digest_file, read_bytes
+from frf_ipz.numpy_files import read_numpy
+from frf_ipz.output_files import write_bytes
 
 LIBRARY = "ansys.mapdl.reader"
 PROCESS = "frf_ipz.fe.matrices.ansys_full_process"
@@ -61,7 +61,7 @@ def _arrays(path: Path, digest: str) -> Any:  # noqa: ANN401 - named arrays
     del digest
     with TemporaryDirectory() as folder:
         copy, target = Path(folder) / "file.full", Path(folder) / "read.npz"
-        copy.write_bytes(read_bytes(path, most_bytes=MOST_BYTES))
+        write_bytes(copy, read_bytes(path, most_bytes=MOST_BYTES))
         command = [sys.executable, "-m", PROCESS, str(copy), str(target)]
         try:
             done = subprocess.run(command, capture_output=True, timeout=LONGEST_S, check=False)
@@ -70,8 +70,7 @@ def _arrays(path: Path, digest: str) -> Any:  # noqa: ANN401 - named arrays
         if done.returncode or not target.exists():
             said = " ".join(done.stderr.decode("utf-8", "replace").split())[-LAST_LETTERS:]
             raise FileFormatError(path, f"cannot be read as a .full file of Ansys: {said or 'it is damaged'}")
-        arrays = np.load(io.BytesIO(read_bytes(target)), allow_pickle=False)
-        return {name: arrays[name] for name in arrays.files}
+        return read_numpy(target, only="", most_bytes=MOST_BYTES).arrays
 
 
 def _dofs(labels: Any) -> tuple[Dof, ...]:  # noqa: ANN401 - node and number of the DOF, from 0

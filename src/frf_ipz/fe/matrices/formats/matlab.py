@@ -11,7 +11,8 @@ from scipy import sparse
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.matrices.named_arrays import read_named
-from frf_ipz.fe.matrices.stored import MOST_BYTES, MatrixFormat, MatrixRequest, StoredMatrix, errors_of_library
+from frf_ipz.fe.matrices.stored import MOST_BYTES, MatrixFormat, MatrixRequest, StoredMatrix
+from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.input_files import read_bytes
 from frf_ipz.matlab_files import read_matlab
 
@@ -31,10 +32,10 @@ def _fits(path: Path, head: bytes) -> bool:
 def _read(request: MatrixRequest) -> StoredMatrix:
     data = read_bytes(request.path, most_bytes=MOST_BYTES)
     if SIGNATURE in {data[:8], data[512:520]}:
-        with errors_of_library(request.path, "a MATLAB file of version 7.3"):
+        with errors_of_reader(request.path, "a MATLAB file of version 7.3"):
             return read_named(_arrays_of_hdf5(request.path, data), request)
     variables = read_matlab(request.path, most_bytes=MOST_BYTES)
-    with errors_of_library(request.path, KIND):
+    with errors_of_reader(request.path, KIND):
         return read_named(_flattened("", variables, 0), request)
 
 

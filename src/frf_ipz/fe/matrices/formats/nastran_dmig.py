@@ -14,9 +14,8 @@ from frf_ipz.fe.matrices.stored import (
     StoredMatrix,
     as_matrix,
     both_triangles,
-    errors_of_library,
-    import_library,
 )
+from frf_ipz.foreign_errors import errors_of_reader, import_reader
 from frf_ipz.input_files import read_text
 
 if TYPE_CHECKING:
@@ -33,13 +32,13 @@ def _fits(path: Path, head: bytes) -> bool:
 
 def _read(request: MatrixRequest) -> StoredMatrix:
     path = request.path
-    bulk = import_library(path, "pyyeti.nastran.bulk", kind=KIND, extra="nastran")
+    bulk = import_reader(path, "pyyeti.nastran.bulk", kind=KIND, extra="nastran")
     text = read_text(path)
     names = list(dict.fromkeys(name.lower() for name in HEADER.findall(text)))
     if not names:
         raise FileFormatError(path, "has no header card of a DMIG matrix; punch it again, or export OUTPUT4")
     chosen = request.choose(dict.fromkeys(names))
-    with errors_of_library(path, KIND):
+    with errors_of_reader(path, KIND):
         frames = bulk.rddmig(io.StringIO(text), chosen, square=True, follow_includes=False)
         frame: Any = next(frame for name, frame in frames.items() if name.lower() == chosen)
         values, labels = frame.to_numpy(), frame.index.tolist()

@@ -14,10 +14,10 @@ from frf_ipz.fe.matrices.stored import (
     StoredMatrix,
     as_matrix,
     both_triangles,
-    errors_of_library,
-    import_library,
 )
+from frf_ipz.foreign_errors import errors_of_reader, import_reader
 from frf_ipz.input_files import read_bytes
+from frf_ipz.output_files import write_bytes
 
 KIND = "an OUTPUT4 file of Nastran"
 MOST_ROWS = 10**7
@@ -25,10 +25,10 @@ MOST_ROWS = 10**7
 
 def _read(request: MatrixRequest) -> StoredMatrix:
     path = request.path
-    op4 = import_library(path, "pyyeti.nastran.op4", kind=KIND, extra="nastran")
-    with TemporaryDirectory() as folder, errors_of_library(path, KIND):  # pyyeti takes paths
+    op4 = import_reader(path, "pyyeti.nastran.op4", kind=KIND, extra="nastran")
+    with TemporaryDirectory() as folder, errors_of_reader(path, KIND):  # pyyeti takes paths
         copy = Path(folder) / "matrices.op4"
-        copy.write_bytes(read_bytes(path, most_bytes=MOST_BYTES))
+        write_bytes(copy, read_bytes(path, most_bytes=MOST_BYTES))
         _, sizes, *_ = op4.dir(str(copy), verbose=False)
         if any(max(size) > MOST_ROWS for size in sizes):
             raise FileFormatError(path, f"says that a matrix has more than {MOST_ROWS} rows; is it damaged?")

@@ -6,66 +6,35 @@ Nothing that is pickled is read.
 
 from __future__ import annotations
 
-import io
-import zipfile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.lib import format as npy_format
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.matrices.named_arrays import read_named
-from frf_ipz.fe.matrices.stored import MOST_BYTES, MatrixFormat, MatrixRequest, StoredMatrix, errors_of_library
-from frf_ipz.input_files import read_bytes
+from frf_ipz.fe.matrices.stored import MOST_BYTES, MatrixFormat, MatrixRequest, StoredMatrix
+from frf_ipz.foreign_errors import errors_of_reader
+from frf_ipz.numpy_files import KIND, is_numpy_file, read_numpy
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
-MAGIC, ZIP = b"\x93NUMPY", b"PK\x03\x04"
-KIND = "a NumPy file"
 ONLY = "matrix"  # what the one array of a file is called
 
 
 def _fits(path: Path, head: bytes) -> bool:
-    return (
-        path.suffix.lower() in {".npz", ".npy"} or head.startswith(MAGIC) or (head.startswith(ZIP) and b".npy" in head)
-    )
+    return path.suffix.lower() in {".npz", ".npy"} or is_numpy_file(head)
 
 
 def _read(request: MatrixRequest) -> StoredMatrix:
-    data = read_bytes(request.path, most_bytes=MOST_BYTES)
-    arrays: dict[str, Any] = {}
-    with errors_of_library(request.path, KIND):
-        if data.startswith(MAGIC):
-            arrays[ONLY] = _array(request.path, ONLY, data)
-        else:
-            with zipfile.ZipFile(io.BytesIO(data)) as archive:
-                members = archive.infolist()
-                if sum(member.file_size for member in members) > MOST_BYTES:
-                    raise FileFormatError(request.path, f"expands to more than {MOST_BYTES >> 20} MB; is it damaged?")
-                for member in members:
-                    name = member.filename.removesuffix(".npy")
-                    arrays[name] = _array(request.path, name, archive.read(member))
-        return read_named(_assembled(arrays), request)
+    found = read_numpy(request.path, only=ONLY, most_bytes=MOST_BYTES)
+    for name in found.pickled:
+        raise FileFormatError(request.path, f"holds pickled objects in '{name}', which are not read; save numbers")
+    with errors_of_reader(request.path, KIND):
+        return read_named(_assembled(found.arrays), request)
 
 
 FORMAT = MatrixFormat(rank=1, fits=_fits, read=_read)
-
-
-def _array(path: Path, name: str, data: bytes) -> NDArray[Any]:
-    """Read one array whose header fits its size."""
-    stream = io.BytesIO(data)
-    version = npy_format.read_magic(stream)
-    reader = npy_format.read_array_header_1_0 if version == (1, 0) else npy_format.read_array_header_2_0
-    shape, _, kind = reader(stream)
-    if kind.hasobject:
-        raise FileFormatError(path, f"holds pickled objects in '{name}', which are not read; save numbers")
-    if int(np.prod(shape, dtype=object)) * kind.itemsize > len(data):
-        raise FileFormatError(path, f"'{name}' promises more numbers than there are: it is cut off; export it again")
-    stream.seek(0)
-    return np.asarray(npy_format.read_array(stream, allow_pickle=False))
 
 
 def _assembled(arrays: dict[str, Any]) -> dict[str, Any]:

@@ -7,6 +7,8 @@ import warnings
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from frf_ipz.errors import FileFormatError, FrfIpzError
 
 if TYPE_CHECKING:
@@ -44,7 +46,7 @@ def errors_of_reader(path: Path, kind: str) -> Iterator[None]:
     except FrfIpzError:
         raise
     except MemoryError:
-        raise FileFormatError(path, f"does not fit into memory as {kind}; export shorter recordings") from None
+        raise FileFormatError(path, f"does not fit into memory as {kind}; export less") from None
     except Exception as error:  # a library raises anything on damaged bytes
         said = " ".join(str(error).split())[:LONGEST] or type(error).__name__
         problem = f"cannot be read as {kind}: it is cut off or damaged ({said}); copy or export it again"
@@ -76,7 +78,8 @@ def import_reader(path: Path, module: str, *, kind: str, extra: str) -> Any:  # 
         If it is not installed: names the extra.
     """
     try:
-        return importlib.import_module(module)
+        with np.printoptions():  # some set NumPy's for all: numbers would lose digits wherever they become text
+            return importlib.import_module(module)
     except ImportError:
         problem = f"is {kind}, whose reader {module} is not installed; run: pip install 'frf_ipz[{extra}]'"
-        raise FileFormatError(path, f"{problem}, or export it as CSV") from None
+        raise FileFormatError(path, f"{problem}, or export it in another format") from None
