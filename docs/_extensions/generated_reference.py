@@ -242,13 +242,22 @@ def _default(item: Field[Any]) -> str:
     value = item.default if item.default_factory is MISSING else item.default_factory()
     if value is None:
         return "left out"
-    if isinstance(value, bool):
-        return f"`{str(value).lower()}`"
     if isinstance(value, tuple | dict | str) and not value:
         return "empty"
+    return f"`{_written(value)}`"
+
+
+def _written(value: Any) -> str:
+    """Write a value as a TOML file has it."""
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, str):
-        return f'`"{value}"`'
-    return f"`{list(value)}`" if isinstance(value, tuple) else f"`{value:g}`"
+        return f'"{value}"'
+    if isinstance(value, tuple):
+        return str(list(value))
+    if is_dataclass(value):
+        return "{ " + ", ".join(f"{item.name} = {_written(getattr(value, item.name))}" for item in fields(value)) + " }"
+    return f"{value:g}"
 
 
 def _is_optional(item: Field[Any]) -> bool:
