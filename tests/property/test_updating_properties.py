@@ -52,7 +52,7 @@ def test_an_update_is_reciprocal_and_its_export_the_same_model(seed):
     s = 2j * np.pi * np.linspace(*case.fit.band_hz, 20)
     forward, updated_again = compute_frfs(update.model, [first, back], s).T
     assert np.abs(forward - updated_again).max() < ROUNDING * np.abs(forward).max()
-    exported = to_control(make_state_space(case, update, points=case.structure.points))(s)
+    exported = to_control(make_state_space(case.fit, update, points=case.structure.points))(s)
     row = exported.reshape(-1, exported.shape[-1])[0]
     assert np.abs(row - forward).max() < 1e-6 * np.abs(forward).max()
 

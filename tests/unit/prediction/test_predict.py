@@ -173,5 +173,5 @@ def test_points_need_not_be_retained():
     case = make_update_case(3)
     expanded = [dof for dof in case.reduced_model.expanded_dofs if dof not in case.reduced_model.dofs]
     model = updated(case.reduced_model)
-    prediction = predict_frfs(case, model, points=expanded[:2], frequency_hz=np.linspace(*case.fit.band_hz, 50))
+    prediction = predict_frfs(case.fit, model, points=expanded[:2], frequency_hz=np.linspace(*case.fit.band_hz, 50))
     assert np.isfinite(prediction.values).all()
