@@ -145,7 +145,6 @@ CASES = {
         lambda f: edit(f, "pipeline.toml", "[predict]", '[update]\nparameters = "diagnosis"\n[predict]'),
         ["pipeline.toml", "parameters", "apply = true"],
     ),
-    "mass singular": (lambda f: matrices(f, mass=np.array([[1.0, 1.0], [1.0, 1.0]])), ["M.mtx", "definite"]),
     "mass indefinite": (lambda f: matrices(f, mass=np.diag([1.0, -1.0])), ["M.mtx", "21:z", "mass -1"]),
     "stiffness indefinite": (lambda f: matrices(f, stiffness=np.diag([1e6, -1e6])), ["K.mtx", "definite"]),
     "not symmetric": (lambda f: matrices(f, stiffness=np.array([[2e6, 0.0], [-1e6, 2e6]])), ["K.mtx", "symmetric"]),
@@ -224,3 +223,9 @@ def test_a_full_disk_leaves_the_last_good_results(campaign, monkeypatch, capsys)
     assert status == 2
     assert "disk is full" in said
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_a_combination_without_mass_follows_statically(campaign, monkeypatch, capsys):
+    matrices(campaign, mass=np.array([[1.0, 1.0], [1.0, 1.0]]))
+    status, said = run(monkeypatch, capsys, "run", campaign / "pipeline.toml", "--out", campaign / "out")
+    assert status == 0, said

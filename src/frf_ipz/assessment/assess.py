@@ -170,7 +170,7 @@ def compare_modes(
 
 def _modes(model: StructuralModel, measured: MeasuredModes) -> ComputedModes | None:
     """Modes of a model that may be among the measured ones; None where they cannot be computed."""
-    n_modes = min(2 * len(measured.frequency_hz) + MODES_BEYOND, len(model.dofs))
+    n_modes = min(2 * len(measured.frequency_hz) + MODES_BEYOND, model.n_modes)
     try:
         return computed_modes(solve_modes(model, n_modes=n_modes))
     except NumericalError:

@@ -14,7 +14,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 
 DIFFERENCE = 3  # order of the differences: a parabola over four lines is no noise
 BLOCK_LINES = 48  # lines behind one estimate: its scatter is then some 20 %
-TINY = 1e-300  # so that the logarithm of a dead channel stays finite
+TINY = 1e-200  # so that logarithms and squared weights of a dead channel stay finite
 
 
 def rough_variance(values: ComplexArray) -> FloatArray:

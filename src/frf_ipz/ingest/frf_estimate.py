@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import pandas as pd
 
@@ -10,6 +11,8 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.frf import FrfSet
 from frf_ipz.modes import ModalParameters
+
+COHERENCES = ("frequency_hz", "output_dof", "input_dof", "ordinary_coherence", "multiple_coherence")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,7 +92,7 @@ class FrfEstimate(Tabulated, Drawn):
     choices: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     modes: ModalParameters | None = None
-    coherences: pd.DataFrame = field(default_factory=pd.DataFrame)
+    coherences: pd.DataFrame = field(default_factory=partial(pd.DataFrame, columns=list(COHERENCES)))
 
     def __repr__(self) -> str:
         if self.modes is not None:

@@ -271,7 +271,7 @@ def _damped_from_undamped(undamped: PoleForm, damped: PoleForm, output: FloatArr
     if not is_found.all() or _merge(squares):
         return None
     roots, exact = undamped.roots(outputs, inputs, squares)
-    if not exact.all() or damped.damping is None:
+    if not exact.all() or damped.damping is None or not roots.slope.all():  # a double zero has no slope
         return None
     shift = np.sum(roots.left_vectors * (damped.damping @ roots.right_vectors), axis=0) / (2 * roots.slope)
     s = 1j * np.sqrt(squares.astype(complex))

@@ -69,7 +69,12 @@ def test_of_frfs_that_were_estimated_elsewhere_too(tmp_path):
 
 @pytest.mark.parametrize(
     ("dofs", "message"),
-    [(["3:+z"], "there is no sensor at '3:[+]z'"), (["1:z", "2:z"], "leaves no sensor"), (["tip"], "no DOF label")],
+    [
+        (["3:+z"], "there is no sensor at '3:[+]z'"),
+        (["1:z", "2:z"], "leaves no sensor"),
+        (["1:zz"], "no DOF label"),
+        (["tip"], "no sensor at 'tip'"),
+    ],
 )
 def test_invalid_limits_are_refused(campaign, dofs, message):
     with pytest.raises(FileFormatError, match=f"ingest.hide.*{message}"):

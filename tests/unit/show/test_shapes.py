@@ -46,7 +46,9 @@ def measured_run(model, nominal):
     signs = np.array([label.sign for label in LABELS])
     powers = np.array([label.quantity.power for label in LABELS])
     residues = (shapes * signs[:, None]).T * roots.values[:, None] ** powers
-    fit = SimpleNamespace(n_modes=5, labels=LABELS, model=SimpleNamespace(poles=roots.values, residues=residues))
+    fit = SimpleNamespace(
+        n_modes=5, labels=LABELS, modes_given=None, model=SimpleNamespace(poles=roots.values, residues=residues)
+    )
     targets = [
         SimpleNamespace(kind="pole", measured=k, computed_value=value, verdict=PairVerdict.PAIRED)
         for k, value in enumerate(nominal_roots.values)

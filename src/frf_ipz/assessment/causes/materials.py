@@ -242,7 +242,7 @@ def _rebuilt(cause: Cause, situation: Situation, dimensions: tuple[str, ...], fa
     try:
         nominal = situation.model
         model = build_beam(replace(file, beam=replace(beam, section=sections))).with_ports(nominal.ports)
-        modes = solve_modes(model, n_modes=min(len(situation.computed.frequency_hz) + 3, len(model.dofs)))
+        modes = solve_modes(model, n_modes=min(len(situation.computed.frequency_hz) + 3, model.n_modes))
     except FrfIpzError:
         return cause
     return replace(cause, computed=computed_modes(modes), frequency_factor=1.0, gain=1.0)

@@ -45,7 +45,7 @@ def other_supports(situation: Situation) -> Iterator[Cause]:
                 if np.array_equal(model.fixed, situation.model.fixed):
                     continue
                 model.rows(list(needed))  # refuses DOFs that would be held
-                modes = solve_modes(model, n_modes=min(len(situation.computed.frequency_hz) + 2, len(model.dofs)))
+                modes = solve_modes(model, n_modes=min(len(situation.computed.frequency_hz) + 2, model.n_modes))
             except FrfIpzError:
                 continue
             says = f'the {end} end seems to be {condition}: write {end} = "{condition}"'

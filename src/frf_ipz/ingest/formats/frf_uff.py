@@ -143,7 +143,8 @@ def _make_frf(source: FrfSource, function: UniversalFunction, coherence: Univers
     unit = f"1/({unit})" if unit and source.is_reciprocal else unit
     order = np.argsort(function.x, kind="stable")
     frequency_hz = function.x[order] * _abscissa_factor(source, function)
-    values = function.values[order] * _unit_of_ratio(source, function)
+    with np.errstate(invalid="ignore"):  # what is not finite is looked for below
+        values = function.values[order] * _unit_of_ratio(source, function)
     is_finite = np.isfinite(values)
     left_out = ~is_finite & (frequency_hz == 0.0)
     if not (is_finite | left_out).all():
