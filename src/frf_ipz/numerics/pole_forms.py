@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.numerics.pencils import Roots, damped_zeros, undamped_poles
 
 Numbers: TypeAlias = ComplexArray | FloatArray
@@ -102,26 +102,39 @@ class PoleForm:
         slope, exact = np.zeros(len(zeros), complex), np.zeros(len(zeros), bool)
         for first in range(0, len(zeros), ROWS_AT_ONCE):
             part = slice(first, first + ROWS_AT_ONCE)
-            z = zeros[part]
-            residues, double = self._residues(outputs[part], inputs[part])
-            with np.errstate(divide="ignore", invalid="ignore"):  # a zero on a pole is not exact
-                x, y = self._motion(inputs[part], z), self._motion(outputs[part], z)
-                slope[part] = np.sum(residues / (z[:, None] - self.poles) ** 2, axis=1) + 2 * double / z**3
-                exact[part] = self._is_exact(x, inputs[part], z) & self._is_exact(y, outputs[part], z)
-            right[:, part], left[:, part] = x, y
+            z, sensors, forces = zeros[part], outputs[part], inputs[part]
+            by_force, by_sensor = forces @ self.shapes, sensors @ self.shapes
+            residues, double = self._residues(sensors, forces)
+            at = _beside_pole(residues, double, self.poles, z)
+            pole = (np.arange(len(z)), at.nearest)
+            driven = np.abs(by_force[pole]) >= np.abs(by_sensor[pole])
+            with np.errstate(divide="ignore", invalid="ignore"):  # a pole that neither end sees is not exact
+                gap = np.where(np.abs(at.gap * at.slope) < np.abs(at.rest), -at.own / at.rest, at.gap)
+                x_scale, y_scale = np.where(driven, gap, 1.0), np.where(driven, 1.0, gap)
+                x_own = np.where(driven, by_force[pole] / self.slope[at.nearest], -at.rest / by_sensor[pole])
+                y_own = np.where(driven, -at.rest / by_force[pole], by_sensor[pole] / self.slope[at.nearest])
+                x = self._motion(forces, by_force, at, x_scale, x_own, z)
+                y = self._motion(sensors, by_sensor, at, y_scale, y_own, z)
+                exact[part] = self._is_exact(x, forces * x_scale[:, None], z)
+                exact[part] &= self._is_exact(y, sensors * y_scale[:, None], z)
+            exact[part] &= at.second > np.finfo(float).eps / SMALL_RESIDUE * np.abs(z)
+            right[:, part], left[:, part], slope[part] = x, y, -at.rest - gap * at.slope
         return Roots(values=zeros, right_vectors=right, left_vectors=left, slope=slope), exact
 
     def _residues(self, outputs: FloatArray, inputs: FloatArray) -> tuple[Numbers, FloatArray]:
         residues = (outputs @ self.shapes) * (inputs @ self.shapes) / self.slope
         return residues, np.sum((outputs @ self.rigid) * (inputs @ self.rigid), axis=1)
 
-    def _motion(self, loads: FloatArray, z: ComplexArray) -> ComplexArray:
-        """Motion under unit loads, (r, n)."""
-        by_pole = (loads @ self.shapes) / self.slope / (z[:, None] - self.poles)
+    def _motion(
+        self, loads: FloatArray, by_load: Numbers, at: _BesidePole, scale: Numbers, own: Numbers, z: ComplexArray
+    ) -> ComplexArray:
+        """Motion under scaled loads, (r, n), with that of the nearest pole given."""
+        by_pole = scale[:, None] * by_load / self.slope / at.distance
+        np.put_along_axis(by_pole, at.nearest[:, None], own[:, None], axis=1)
         motion = self.shapes @ by_pole.T
-        return np.asarray(
-            motion + self.rigid @ ((loads @ self.rigid) / z[:, None] ** 2).T if self.rigid.size else motion
-        )
+        if not self.rigid.size:
+            return np.asarray(motion)
+        return np.asarray(motion + self.rigid @ (scale[:, None] * (loads @ self.rigid) / z[:, None] ** 2).T)
 
     def _is_exact(self, motion: ComplexArray, loads: FloatArray, z: ComplexArray) -> BoolArray:
         if self.damping is None:
@@ -196,6 +209,46 @@ def damped_form(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) ->
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _BesidePole:
+    """The sum over the poles as that of the nearest one and the rest, where ``H = own / gap + rest``.
+
+    ``gap`` is the difference of two numbers that may be nearly one: of a zero next to a pole, one end sits nearly on a
+    node of the mode, ``-own / rest`` is the same and keeps its digits.
+    """
+
+    nearest: IntArray
+    own: Numbers
+    gap: Numbers
+    rest: Numbers
+    slope: Numbers
+    distance: Numbers
+    second: FloatArray
+
+
+def _beside_pole(residues: Numbers, double: FloatArray, poles: Numbers, z: Numbers) -> _BesidePole:
+    """Split; distance to all poles with 1 for the nearest, slope of the rest, and the second smallest distance."""
+    distance = z[:, None] - poles
+    moduli = np.abs(distance)
+    nearest = np.argmin(moduli, axis=1)
+    places = nearest[:, None]
+    gap, own = (np.take_along_axis(values, places, axis=1)[:, 0] for values in (distance, residues))
+    np.put_along_axis(distance, places, 1.0, axis=1)
+    np.put_along_axis(moduli, places, np.inf, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # where it leads nowhere, nothing is found
+        terms = residues / distance
+        np.put_along_axis(terms, places, 0.0, axis=1)
+        return _BesidePole(
+            nearest=nearest,
+            own=own,
+            gap=gap,
+            rest=terms.sum(axis=1) + double / z**2,
+            slope=-np.sum(terms / distance, axis=1) - 2 * double / z**3,
+            distance=distance,
+            second=moduli.min(axis=1, initial=np.inf),
+        )
+
+
 def _newton(
     residues: Numbers, double: FloatArray, poles: Numbers, start: ComplexArray
 ) -> tuple[ComplexArray, BoolArray]:
@@ -207,18 +260,10 @@ def _newton(
         open_ones = np.flatnonzero(~found)
         if not len(open_ones):
             break
-        z, numerators, rigid = values[open_ones], residues[open_ones], double[open_ones]
-        distance = z[:, None] - poles
-        nearest = np.argmin(np.abs(distance), axis=1)[:, None]
-        gap = np.take_along_axis(distance, nearest, axis=1)[:, 0]
-        own = np.take_along_axis(numerators, nearest, axis=1)[:, 0]
-        np.put_along_axis(distance, nearest, 1.0, axis=1)
+        z = values[open_ones]
+        at = _beside_pole(residues[open_ones], double[open_ones], poles, z)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # where it leads nowhere, nothing is found
-            terms = numerators / distance
-            np.put_along_axis(terms, nearest, 0.0, axis=1)
-            rest = terms.sum(axis=1) + rigid / z**2
-            slope = -np.sum(terms / distance, axis=1) - 2 * rigid / z**3
-            step = (own + gap * rest) / (rest + gap * slope)
+            step = (at.own + at.gap * at.rest) / (at.rest + at.gap * at.slope)
         is_finite = np.isfinite(step)
         values[open_ones] = z - np.where(is_finite, step, 0.0)
         found[open_ones] = is_finite & (np.abs(step) <= CONVERGED * np.abs(z))
