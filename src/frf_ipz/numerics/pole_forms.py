@@ -232,7 +232,8 @@ def _beside_pole(residues: Numbers, double: FloatArray, poles: Numbers, z: Numbe
     moduli = np.abs(distance)
     nearest = np.argmin(moduli, axis=1)
     places = nearest[:, None]
-    gap, own = np.take_along_axis(distance, places, axis=1)[:, 0], np.take_along_axis(residues, places, axis=1)[:, 0]
+    rows = np.arange(len(z))
+    gap, own = distance[rows, nearest], residues[rows, nearest]
     np.put_along_axis(distance, places, 1.0, axis=1)
     np.put_along_axis(moduli, places, np.inf, axis=1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # where it leads nowhere, nothing is found
