@@ -43,10 +43,19 @@ def accelerance(M, K, ratios, outputs, inputs, f):
     return np.einsum("or,fr,ir->foi", shapes[np.array(outputs) - 1], modal, shapes[np.array(inputs) - 1])
 
 
-@pytest.fixture(scope="module")
-def truth():
-    """The real chain: springs 8 % stiffer to the left and 5 % softer to the right, and one mass heavier."""
-    M, K = make_chain(STEEL_N_M * np.linspace(1.08, 0.95, N), MASS_KG * np.where(np.arange(N) == 6, 1.05, 1.0))
+# Springs 8 % stiffer to the left and 5 % softer to the right, which no single cause explains: the search is long.
+GRADED = np.linspace(1.08, 0.95, N), np.where(np.arange(N) == 6, 1.05, 1.0)
+STIFFER = np.full(N, 1.06), np.ones(N)
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(STIFFER, id="stiffer"), pytest.param(GRADED, id="graded", marks=pytest.mark.slow)],
+)
+def truth(request):
+    """The real chain."""
+    stiffness_ratios, mass_ratios = request.param
+    M, K = make_chain(STEEL_N_M * stiffness_ratios, MASS_KG * mass_ratios)
     return M, K, np.full(N, 0.01)
 
 
