@@ -1,6 +1,7 @@
 """Localisation of a force of unknown law, by the sensors alone."""
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -41,22 +42,32 @@ def segments_and_linear_fit(model, observations, *, duration_s=2.0, floor=2e-3):
     return segments, fit_linear(segments, make_nuisance_prior(modal_model, segments, 75.0, DiagnoseOptions()))
 
 
+@pytest.fixture(scope="module")
+def localised(chain, strike):
+    """Segments, their linear fit and where the force of a law acts, computed once for each law."""
+
+    @cache
+    def localise(name):
+        segments, linear = segments_and_linear_fit(chain.model, strike(*LAWS[name][:2]))
+        return segments, linear, localise_force(segments, linear)
+
+    return localise
+
+
 @pytest.mark.parametrize("name", LAWS)
-def test_a_force_is_localised_whatever_its_law(chain, strike, name):
-    law, where, location = LAWS[name]
-    segments, linear = segments_and_linear_fit(chain.model, strike(law, where))
-    localisation = localise_force(segments, linear)
+def test_a_force_is_localised_whatever_its_law(localised, name):
+    location = LAWS[name][2]
+    _, linear, localisation = localised(name)
     assert dict(linear.nuisance_prior.modal_model.locations[localisation.equivalent[0]].entries) == location
     assert localisation.forces[0].cost < 1e-3 * linear.cost
     assert set(localisation.equivalent) <= set(localisation.possible)
     assert len(localisation.possible) < len(linear.nuisance_prior.modal_model.locations)
 
 
-def test_a_location_is_fitted_from_a_neighbour_that_explains(chain, strike, monkeypatch):
+def test_a_location_is_fitted_from_a_neighbour_that_explains(localised, monkeypatch):
     """From the nominal model all locations but one end with a large misfit."""
-    law, where, _ = LAWS["cubic"]
-    segments, linear = segments_and_linear_fit(chain.model, strike(law, where))
-    best, modal_model = localise_force(segments, linear).equivalent[0], linear.nuisance_prior.modal_model
+    segments, linear, localisation = localised("cubic")
+    best, modal_model = localisation.equivalent[0], linear.nuisance_prior.modal_model
     neighbour = next(
         location for location in range(len(modal_model.locations)) if best in neighbours(modal_model, location, 1)
     )
@@ -99,20 +110,18 @@ def test_a_single_sensor_localises_nothing(chain, strike):
 @pytest.mark.parametrize(
     ("name", "law", "strength", "shape"), [("cubic", CubicStiffness(), 2e10, 0.0), ("gap", GapContact(), 3e4, 2e-4)]
 )
-def test_the_parameters_of_a_law_are_read_from_the_free_force(chain, strike, name, law, strength, shape):
-    segments, linear = segments_and_linear_fit(chain.model, strike(*LAWS[name][:2]))
-    start = start_from_force(segments, linear, localise_force(segments, linear).forces[0], law)
+def test_the_parameters_of_a_law_are_read_from_the_free_force(localised, name, law, strength, shape):
+    segments, linear, localisation = localised(name)
+    start = start_from_force(segments, linear, localisation.forces[0], law)
     assert start.strength == pytest.approx(strength, rel=PARAMETERS)
     assert start.shape == pytest.approx(shape, rel=PARAMETERS)
     assert np.isfinite(start.nuisance).all()
 
 
 @pytest.mark.parametrize("far_off", [True, False])
-def test_a_law_that_the_alternating_fit_loses_is_simulated_as_read_from_the_free_force(
-    chain, strike, monkeypatch, far_off
-):
-    segments, linear = segments_and_linear_fit(chain.model, strike(*LAWS["gap"][:2]))
-    problem = LawFitProblem(segments=segments, linear=linear, localisation=localise_force(segments, linear))
+def test_a_law_that_the_alternating_fit_loses_is_simulated_as_read_from_the_free_force(localised, monkeypatch, far_off):
+    segments, linear, localisation = localised("gap")
+    problem = LawFitProblem(segments=segments, linear=linear, localisation=localisation)
     fit_alternating = candidates.fit_alternating
 
     def lose_law(*arguments, **options):
@@ -127,9 +136,8 @@ def test_a_law_that_the_alternating_fit_loses_is_simulated_as_read_from_the_free
     assert is_found is far_off
 
 
-def test_the_location_of_the_best_free_force_is_simulated_whatever_the_alternating_fit_says(chain, strike, monkeypatch):
-    segments, linear = segments_and_linear_fit(chain.model, strike(*LAWS["cubic"][:2]))
-    localisation = localise_force(segments, linear)
+def test_the_location_of_the_best_free_force_is_simulated_whatever_the_alternating_fit_says(localised, monkeypatch):
+    segments, linear, localisation = localised("cubic")
     everywhere = tuple(range(len(linear.nuisance_prior.modal_model.locations)))
     problem = LawFitProblem(segments=segments, linear=linear, localisation=replace(localisation, possible=everywhere))
     fit_scored, fit_from_free_force = candidates._fit_scored, candidates._fit_from_free_force
