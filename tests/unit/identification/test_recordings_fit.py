@@ -122,6 +122,7 @@ def test_steel_beam(recordings):
     assert fit.misfit.groupby("frf")["ratio"].median().max() < 1.5
 
 
+@pytest.mark.slow
 def test_raw_impacts_of_a_lightly_damped_structure(recordings):
     frfs = frfs_of(recordings / "raw_hammer" / "test.toml")
     fit = fit_modes(frfs, options=FitOptions(band_hz=(500.0, 6500.0)))
