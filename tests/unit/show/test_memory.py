@@ -15,7 +15,7 @@ from served_page import serving
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what is resident is read from /proc")
 SOON_S = 120.0
-FEW, MORE, MANY = 5, 40, 300
+FEW, MORE, MANY = 5, 20, 300
 MOST_MB_EACH = 0.3  # results of the demo and all that is made of them take 9 MB
 MOST_MB = 400
 
