@@ -86,6 +86,7 @@ def test_truth_without_scatter_is_the_nominal_model(kind):
     assert check.exact < SIMULATION
 
 
+@pytest.mark.slow
 def test_a_plate_without_scatter_is_the_nominal_model():
     check = check_nominal("plate", 1)
     assert check.frequency < 1e-4
