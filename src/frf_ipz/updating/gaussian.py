@@ -35,7 +35,7 @@ MAX_TRIALS = 40  # up to ten million times the slack
 MAX_SCALE_STEPS = 25  # the evidence is flat near its top: more steps change nothing that matters
 MAX_DEVIATION = 6.0  # standard deviations of a scale's prior within which the search stays: a line search may overflow
 LARGEST_SCALE_STEP = 2.0  # of the logarithm of a scale in one step
-FLAT = 1e-2  # of the logarithm of the evidence: what a further step would gain is nothing
+FLAT = 1e-4  # of the logarithm of the evidence: what a further step would gain is nothing (1e-2 moves printed digits)
 MAX_HALVINGS = 10
 ROWS_AT_ONCE = 4096
 
