@@ -92,6 +92,7 @@ def test_gains_that_were_there_before_are_no_change(nominal, real):
     assert frf_ipz.compare_states(state(nominal, real, 1), after, options=FEW).is_changed
 
 
+@pytest.mark.slow
 def test_scatter_is_learnt_from_repeats(nominal, real):
     drawn = np.random.default_rng(0).standard_normal(7)
     machines = [replace(real, stiffness_all=(1 + SCATTER * deviation) * real.stiffness_all) for deviation in drawn]
