@@ -238,7 +238,7 @@ def test_delays_of_channels():
     assert np.sqrt(np.mean(fit.misfit["ratio"] ** 2)) < 1.1
 
 
-@pytest.mark.parametrize("samples", [3.4, 0.4, -1.7])
+@pytest.mark.parametrize("samples", [pytest.param(3.4, marks=pytest.mark.slow), 0.4, -1.7])
 def test_a_delay_that_all_responses_share_is_found(samples):
     truth = random_modes(SPREAD, 0.005, n_outputs=2, n_inputs=1, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, noise=1e-3, seed=SEED)
