@@ -44,6 +44,7 @@ def test_a_model_without_a_mode_in_the_band_is_exported_as_it_is(frfs, method, t
         points=["9:+z"],
         update=frf_ipz.UpdateOptions(method=method),
         export=frf_ipz.ExportOptions(ensemble=3),
+        diagnose=frf_ipz.DiagnoseOptions(run="never"),
     ).run(tmp_path / "run")
     updated = results.updated_model
     assert updated.status is frf_ipz.UpdateStatus.NOTHING_TO_DO
