@@ -6,7 +6,7 @@ import pytest
 import frf_ipz
 from fe_models import beam
 
-LINES_HZ = np.arange(10.0, 700.0, 1.0)
+LINES_HZ = np.arange(30.0, 700.0, 1.0)  # beyond the unstable poles, at 15 Hz: a fit knows none inside its band
 OUTPUTS, INPUTS, POINT = ["21:+z", "12:+z"], ["18:+z", "6:+z"], "15:+z"
 SOFT = 0.97  # of the machine's stiffness: the model's
 WITHIN_DB = 0.2  # at the point that was never measured
