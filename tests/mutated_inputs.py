@@ -48,12 +48,13 @@ class Mutation:
     data: bytes
 
 
-def write_inputs(folder):
+def write_inputs(folder, *, diagnosed=True):
     """Write each input into a folder of its own: one of matrices and FRFs as CSV, one of UFF, and one of records."""
     for name in ("matrices", "uff"):
         (folder / name).mkdir(parents=True)
         export(folder / name, beam(left="clamped", elements=4))
-        (folder / name / "pipeline.toml").write_text(MATRICES_PIPELINE, encoding="utf-8")
+        text = MATRICES_PIPELINE if diagnosed else MATRICES_PIPELINE + '[diagnose]\nrun = "never"\n'
+        (folder / name / "pipeline.toml").write_text(text, encoding="utf-8")
     values = np.exp(2j * np.pi * LINES_HZ / 400) / (1 - (LINES_HZ / 80) ** 2 + 0.02j * LINES_HZ / 80)
     rows = "".join(
         f"{hz:g},5:+z,3:+z,{value.real:.8g},{value.imag:.8g}\n" for hz, value in zip(LINES_HZ, values, strict=True)

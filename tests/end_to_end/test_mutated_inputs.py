@@ -48,6 +48,12 @@ def originals(tmp_path_factory):
     return write_inputs(tmp_path_factory.mktemp("originals"))
 
 
+@pytest.fixture(scope="module")
+def undiagnosed(tmp_path_factory):
+    """The same, without a search for causes, which takes most of the time."""
+    return write_inputs(tmp_path_factory.mktemp("undiagnosed"), diagnosed=False)
+
+
 def work_on(folder, file):
     """Run the chain as far as this file matters; give what it says besides its results."""
     inputs = read_inputs(folder / "pipeline.toml")
@@ -84,14 +90,15 @@ def faults(originals, folder, seed, count):
             path.write_bytes((originals / mutation.source / mutation.file).read_bytes())
 
 
-def test_the_originals_are_valid(originals, tmp_path):
+@pytest.mark.parametrize("inputs", ["undiagnosed", pytest.param("originals", marks=pytest.mark.slow)])
+def test_the_originals_are_valid(request, tmp_path, inputs):
     for source in ("matrices", "uff", "records"):
-        shutil.copytree(originals / source, tmp_path / source)
+        shutil.copytree(request.getfixturevalue(inputs) / source, tmp_path / source)
         assert run_in_memory(read_inputs(tmp_path / source / "pipeline.toml"), until="export").state_space is not None
 
 
-def test_a_few_mutations(originals, tmp_path):
-    assert not list(faults(originals, tmp_path, 1, FEW))
+def test_a_few_mutations(undiagnosed, tmp_path):
+    assert not list(faults(undiagnosed, tmp_path, 1, FEW))
 
 
 @pytest.mark.slow
