@@ -70,7 +70,7 @@ def search_pair(problem: InferenceProblem, first: Ranking, is_good: Callable[[Fi
     Returns
     -------
     Ranking
-        Its base has one component, its fits have two.
+        Its base has one component, its fits have two; `first` itself where effects have no location to be paired at.
     """
     rankings: list[Ranking] = []
     if not first.best.is_far_off or not first.refined:
@@ -81,6 +81,8 @@ def search_pair(problem: InferenceProblem, first: Ranking, is_good: Callable[[Fi
     is_open = first.refined and not first.best.explains_nearly_all
     if is_open and not any(ranking.fits and is_good(ranking.best) for ranking in rankings):
         rankings += _search_far_pairs(problem, first, min((ranking.best.cost for ranking in rankings), default=np.inf))
+    if not rankings:  # of effects without a location there is one component only
+        return first
     best = _most_probable(rankings)
     if best.fits and best.best.mean_misfit <= NEARLY_ALL:
         best = _reposition(problem, best)
@@ -170,6 +172,8 @@ def _search_far_pairs(problem: InferenceProblem, first: Ranking, cost_to_beat: f
     for start in starts:
         if start.cost < FIRST_COST_RATIO * starts[0].cost:
             pairs += [(start.component, start_of_both) for start_of_both in _find_companions(problem, start)]
+    if not pairs:  # effects that sit nowhere have no companions
+        return []
     exact: list[Fit] = []
     for fit in _fit_pairs_roughly(problem, pairs):
         exact.append(problem.fit_exactly(fit, cost_limit=find_cost_limit(exact)))
