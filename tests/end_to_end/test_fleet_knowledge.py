@@ -4,6 +4,7 @@ The machines are beams of twice as many elements as the model has; their moduli 
 """
 
 import json
+import os
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,10 @@ import pytest
 
 import frf_ipz
 
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif("TRIALS" not in os.environ, reason="minutes of diagnoses: TRIALS=10 make slow"),
+]
 
 COUNT, SEED = 35, 2026
 DRAWING = {"length_m": 0.5, "width_m": 0.025, "thickness_m": 0.006, "density_kg_m3": 2700, "left": "clamped"}
