@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from frf_ipz.errors import FileFormatError
 from frf_ipz.input_files import digest_file
 from frf_ipz.runs.folder_lock import LOCK
 from frf_ipz.runs.generations import GENERATIONS, HIDDEN, POINTER, current_folder
@@ -30,7 +31,17 @@ def faults_of_reading(folder):
     """What is wrong with what the program reads: a file that is not its stage's, or what cannot be opened."""
     if results_of(folder) is None:
         return []
-    current, stages = current_folder(folder), json.loads((current_folder(folder) / "run.json").read_text())["stages"]
+    current = current_folder(folder)
+    try:
+        return _faults_of(folder, current)
+    except FileFormatError:
+        if current_folder(folder) == current:
+            raise
+        return faults_of_reading(folder)  # a command has put new results in their place meanwhile
+
+
+def _faults_of(folder, current):
+    stages = json.loads((current / "run.json").read_text())["stages"]
     faults = []
     for place, (name, stage) in enumerate(stages.items()):
         later = [stages[other] for other in list(stages)[place:]]

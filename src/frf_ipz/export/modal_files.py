@@ -92,7 +92,8 @@ def write_modes(fit: ModalFit, path: str | Path) -> None:
         if kind == ".xlsx":
             _write_workbook(target, {"modes": _mode_rows(fit), "shapes": _shape_rows(fit)})
         elif kind == ".csv":
-            write_text(target, _shape_rows(fit).to_csv(index=False, lineterminator="\n"))
+            with np.printoptions(legacy=False):  # that of a program may shorten numbers
+                write_text(target, _shape_rows(fit).to_csv(index=False, lineterminator="\n"))
         else:
             write_text(target, "\n".join(_shape_lines(fit)) + "\n")
     except OSError as error:

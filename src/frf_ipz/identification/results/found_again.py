@@ -21,24 +21,26 @@ from frf_ipz.identification.search.selection import SURE, UNCERTAIN
 from frf_ipz.identification.search.split_half import HALVES
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import FloatArray
+    from frf_ipz.arrays import FloatArray, IntArray
     from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit
     from frf_ipz.identification.search.split_half import SplitHalf
 
 
-def found_again(goodness: GoodnessOfFit, halves: SplitHalf | None) -> FloatArray:
-    """Give the probability that each pole is found again.
+def found_again(goodness: GoodnessOfFit, modes: IntArray, halves: SplitHalf | None) -> FloatArray:
+    """Give the probability that each mode is found again.
 
     Parameters
     ----------
     goodness : GoodnessOfFit
         Of the fit.
+    modes : (n_modes,) int array
+        Indices of the modes among the poles.
     halves : SplitHalf or None
         The fits of even and of odd lines, where they were made.
 
     Returns
     -------
-    (n_poles,) array
+    (n_modes,) array
         0 to 1.
     """
     n_lines, n_frfs = len(goodness.frequency_hz) / HALVES, goodness.drops.shape[1]
@@ -51,5 +53,5 @@ def found_again(goodness: GoodnessOfFit, halves: SplitHalf | None) -> FloatArray
     sure, usual = (ndtr((mean - times * penalty) / np.sqrt(variance)).max(axis=1) for times in (SURE, 1.0))
     damping_std = np.sqrt(HALVES) * goodness.damping_std  # relative; it scatters as the damping itself does
     uncertain = ndtr(np.log(damping_std / UNCERTAIN) / damping_std)
-    expected = np.asarray(uncertain * sure + (1 - uncertain) * usual)
-    return expected if halves is None else (expected + halves.n_halves) / (1 + HALVES)
+    expected = np.asarray(uncertain * sure + (1 - uncertain) * usual)[modes]
+    return expected if halves is None else (expected + halves.n_halves[modes]) / (1 + HALVES)

@@ -69,7 +69,7 @@ def mode_table(
         "significance": goodness.significance[modes],
         "damping_std_ratio": goodness.damping_std[modes],
         "misfit_level": _level_at(goodness, poles),
-        "found_again": found_again(goodness, halves)[modes],
+        "found_again": found_again(goodness, modes, halves),
     }
     remarks = [_remarks(rows, number, float(confused[number])) for number in range(len(poles))]
     quality = [

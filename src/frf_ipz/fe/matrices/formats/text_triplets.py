@@ -47,7 +47,7 @@ SUFFIXES = {".sti", ".mas", ".dam"}
 
 
 def _fits(path: Path, head: bytes) -> bool:
-    if head.lower().startswith((b"%%matrixmarket", b"%matrixmarket")):
+    if head.startswith(b"%"):  # Matrix Market, be its first line right or wrong
         return False
     if path.suffix.lower() in SUFFIXES:
         return True
