@@ -291,11 +291,12 @@ def to_first_order(system: SecondOrder, powers: Sequence[int]) -> Matrices:
     return Matrices(A, B, C, D)
 
 
-def balance_modes(system: Matrices, n_modes: int) -> Matrices:
-    """Scale the two states of each mode so that inputs drive them as much as outputs see them.
+def balance_modes(system: Matrices, outputs: FloatArray) -> Matrices:
+    """Scale the two states of each mode so that inputs drive them as much as outputs see their velocities.
 
     The coordinates are then balanced but for terms of the order of the damping ([Gawronski2004], section 4.2), and
-    those of a rigid-body mode are scaled alike. The blocks of modes in A stay as they are.
+    those of a rigid-body mode are scaled alike. The blocks of modes in A stay as they are. States do not depend on the
+    quantities of the outputs: exports of the same ports in several quantities have the same A and B.
 
     [Gawronski2004] W. K. Gawronski, Advanced structural dynamics and active control of structures, Springer, 2004,
     doi:10.1007/978-0-387-21836-6.
@@ -304,16 +305,17 @@ def balance_modes(system: Matrices, n_modes: int) -> Matrices:
     ----------
     system : Matrices
         Of `to_first_order`.
-    n_modes : int
-        Pairs of states.
+    outputs : (n_outputs, n_modes) array
+        Motion of each output for unit motions of the modes.
 
     Returns
     -------
     Matrices
         With the same FRFs.
     """
+    n_modes = outputs.shape[1]
     driven = np.linalg.norm(system.B.reshape(n_modes, -1), axis=1)
-    seen = np.linalg.norm(system.C.reshape(len(system.C), n_modes, 2), axis=(0, 2))
+    seen = np.linalg.norm(np.unique(outputs, axis=0), axis=0)  # each port once, whatever its quantities
     is_minimal = (driven > 0) & (seen > 0)
     factors = np.repeat(np.sqrt(np.where(is_minimal, seen, 1.0) / np.where(is_minimal, driven, 1.0)), 2)
     ratios = factors[:, None] / factors  # exactly 1 within a mode

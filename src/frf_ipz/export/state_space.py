@@ -418,8 +418,9 @@ def _to_state_space(
     system: SecondOrder, selection: Selection, ports: Ports, options: ExportOptions, *, scale: MeasuredScale
 ) -> StateSpaceModel:
     outputs = ports.outputs
-    matrices = to_first_order(take_states(system, selection), [output.quantity.power for output in outputs])
-    matrices = balance_modes(matrices, len(matrices.A) // 2)
+    taken = take_states(system, selection)
+    matrices = to_first_order(taken, [output.quantity.power for output in outputs])
+    matrices = balance_modes(matrices, taken.outputs)
     modes = [f"rigid-body mode {number + 1}" for number in range(selection.seen)]
     modes += [f"mode {system.n_rigid + place + 1}" for place in np.flatnonzero(selection.elastic)]
     names = [f"{mode} {quantity}" for mode in modes for quantity in ("displacement", "velocity")]

@@ -72,8 +72,8 @@ def test_every_quantity_of_every_chosen_port(reduced):
     assert_same(values[1::2], by_position * S)
 
 
-def test_the_states_of_a_mode_are_driven_as_much_as_seen(reduced):
-    space = exported(reduced)
+def test_the_states_of_a_mode_are_driven_as_much_as_their_velocity_is_seen(reduced):
+    space = exported(reduced, outputs="velocity")
     modes = len(space.A) // 2
     driven = np.linalg.norm(space.B.reshape(modes, -1), axis=1)
     seen = np.linalg.norm(space.C.reshape(len(space.C), modes, 2), axis=(0, 2))
@@ -136,7 +136,8 @@ def test_rigid_body_modes_are_decoupled(reduced):
         assert_allclose(plant, np.eye(2), rtol=0, atol=1e-6)
     assert decoupling.axes == ("tilt", "1:+z")
     sampled = exported(reduced, outputs="displacement", sample_time_s=STEP_S)
-    assert_allclose(frf_ipz.decouple_rigid_body(sampled, axes=axes).inputs, decoupling.inputs, rtol=1e-9)
+    inputs = frf_ipz.decouple_rigid_body(sampled, axes=axes).inputs
+    assert_allclose(inputs, decoupling.inputs, rtol=1e-9, atol=1e-15)  # one of them is 0
     late = exported(reduced, outputs="displacement", delay_s=3e-4, sample_time_s=STEP_S)
     assert decoupling.apply(late).noutputs == 2
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import loadmat
 
 import frf_ipz
@@ -272,3 +272,14 @@ def test_what_python_control_holds_is_written_and_read(tmp_path, suffix):
     assert np.array_equal(back.A, space.A)
     assert (back.dt, back.input_labels) == (space.dt, list(space.input_names))
     assert (back.output_labels, back.state_labels) == (list(space.output_names), list(space.state_names))
+
+
+def test_exports_in_several_quantities_have_the_same_states():
+    measured_model, updated_model = measured(LABELS), updated(MODELS["chain"])
+    spaces = [
+        make_state_space(measured_model, updated_model, points=(), options=ExportOptions(outputs=outputs))
+        for outputs in ("measured", "velocity", ["displacement", "acceleration"])
+    ]
+    for space in spaces[1:]:
+        assert_array_equal(space.A, spaces[0].A)
+        assert_allclose(space.B, spaces[0].B, rtol=1e-12)
