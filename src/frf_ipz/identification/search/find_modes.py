@@ -237,7 +237,9 @@ def _refine_with_final_weights(
     if model_limits or not lines.known.all() or np.median(misfit_ratio) > MODEL_ERROR:
         noise_from = "misfit"
         lines = replace(lines, variance=lines.variance * goodness.level)
-        fit = refine_poles(replace(lines.weighted(), real_modes=data.real_modes), fit.poles, terms)
+        assessed = fit.poles
+        fit = refine_poles(replace(lines.weighted(), real_modes=data.real_modes), assessed, terms)
+        goodness = goodness.of_poles(assessed, fit.poles)
     return FittedModes(
         lines=lines,
         terms=terms,

@@ -8,10 +8,11 @@ by ever more poles.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.identification.likelihood.compression import CompressedSystem, column_gains, response
@@ -65,6 +66,30 @@ class GoodnessOfFit:
     factor: FloatArray
     drops: FloatArray
     is_needed: BoolArray
+
+    def of_poles(self, before: ComplexArray, after: ComplexArray) -> GoodnessOfFit:
+        """Keep what belongs to the poles that a further refinement has left.
+
+        Parameters
+        ----------
+        before : (n_poles,) complex array
+            Poles that were assessed, rad/s.
+        after : (n,) complex array
+            What became of them; some may have been discarded.
+
+        Returns
+        -------
+        GoodnessOfFit
+            With one row a pole of `after`.
+        """
+        kept = linear_sum_assignment(np.abs(after[:, None] - before) / np.abs(before))[1]
+        return replace(
+            self,
+            **{
+                name: getattr(self, name)[kept]
+                for name in ("significance", "damping_std", "factor", "drops", "is_needed")
+            },
+        )
 
 
 def assess_fit(
