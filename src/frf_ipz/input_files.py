@@ -254,6 +254,30 @@ def read_bytes(path: Path, *, most_bytes: int | None = None) -> bytes:
     return data
 
 
+def require_expanded(path: Path, n_bytes: int, *, file_bytes: int, most_bytes: int) -> None:
+    """Refuse what is much larger unpacked than the file is, before it is unpacked.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    n_bytes : int
+        Unpacked.
+    file_bytes : int
+        The file's own size.
+    most_bytes : int
+        What a smaller file may hold.
+
+    Raises
+    ------
+    FileFormatError
+        If it is more than either.
+    """
+    if n_bytes > max(most_bytes, file_bytes):
+        problem = f"it would be {n_bytes / MB:.0f} MB of numbers in a file of {file_bytes / MB:.3g} MB"
+        raise FileFormatError(path, f"{problem}; export less, or without compression")
+
+
 def read_text(path: Path) -> str:
     """Read a text file in UTF-8 (with or without a BOM), else in Latin-1.
 

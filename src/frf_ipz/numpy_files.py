@@ -16,7 +16,7 @@ from numpy.lib import format as npy_format
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader
-from frf_ipz.input_files import read_bytes
+from frf_ipz.input_files import read_bytes, require_expanded
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -83,9 +83,7 @@ def read_numpy(path: Path, *, only: str, most_bytes: int = MOST_BYTES) -> NumpyA
         else:
             with zipfile.ZipFile(io.BytesIO(data)) as archive:
                 n_bytes = sum(member.file_size for member in archive.infolist())
-                if n_bytes > max(most_bytes, len(data)):
-                    problem = f"would be {n_bytes / 1e6:.0f} MB of numbers in a file of {len(data) / 1e6:.3g} MB"
-                    raise FileFormatError(path, f"{problem}; export less, or without compression")
+                require_expanded(path, n_bytes, file_bytes=len(data), most_bytes=most_bytes)
                 contents = {member.filename.removesuffix(".npy"): archive.read(member) for member in archive.infolist()}
         found = {name: _array(path, name, content) for name, content in contents.items()}
     arrays = {name: values for name, values in found.items() if values is not None}

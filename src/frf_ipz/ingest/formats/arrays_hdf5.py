@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 import lazy_loader
 import numpy as np
 
-from frf_ipz.ingest.formats.file_arrays import ArrayFormat, FileArrays
-from frf_ipz.ingest.formats.hdf5_tree import SIGNATURE, open_tree, texts_of
+from frf_ipz.hdf5_files import SIGNATURE, open_tree, texts_of
+from frf_ipz.ingest.formats.file_arrays import MOST_EXPANDED, ArrayFormat, FileArrays
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from frf_ipz.hdf5_files import Hdf5Tree
     from frf_ipz.ingest.formats.file_arrays import NumericArray
-    from frf_ipz.ingest.formats.hdf5_tree import Hdf5Tree
 
 h5py = lazy_loader.load("h5py")  # slow to load, and most recordings do not need it
 
@@ -29,7 +29,7 @@ def _read(path: Path) -> FileArrays:
     arrays: dict[str, NumericArray] = {}
     texts: dict[str, tuple[str, ...]] = {}
     unread: list[str] = []
-    with open_tree(path, KIND) as tree:
+    with open_tree(path, KIND, most_bytes=MOST_EXPANDED) as tree:
         _walk(tree, tree.file, "", arrays, texts, unread)
     return FileArrays(path=path, arrays=arrays, texts=texts, unread=tuple(unread))
 

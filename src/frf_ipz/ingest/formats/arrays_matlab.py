@@ -17,8 +17,8 @@ from scipy.io.matlab import MatlabFunction, MatlabOpaque
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader
+from frf_ipz.hdf5_files import SIGNATURE, Hdf5Tree, open_tree
 from frf_ipz.ingest.formats.file_arrays import MOST_EXPANDED, ArrayFormat, FileArrays
-from frf_ipz.ingest.formats.hdf5_tree import SIGNATURE, Hdf5Tree, open_tree
 from frf_ipz.ingest.formats.text_layout import read_head
 from frf_ipz.input_files import require_regular_file
 from frf_ipz.matlab_files import read_matlab
@@ -130,7 +130,7 @@ def _one_text(cell: object) -> str | None:
 
 def _read_version_7_3(path: Path) -> FileArrays:
     found = _Found()
-    with open_tree(path, KIND) as tree:
+    with open_tree(path, KIND, most_bytes=MOST_EXPANDED) as tree:
         for name, member in tree.members(tree.file):
             if not name.startswith("#"):
                 _take_7_3(tree, name, member, found, 0)

@@ -191,30 +191,6 @@ def last_part(name: str) -> str:
     return LAST_PART.split(name)[-1]
 
 
-def require_size(path: Path, n_bytes: int, file_bytes: int, *, what: str = "it") -> None:
-    """Refuse what is much larger unpacked than the file is, before it is unpacked.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    n_bytes : int
-        Unpacked.
-    file_bytes : int
-        The file's own size.
-    what : str
-        What is that large.
-
-    Raises
-    ------
-    FileFormatError
-        If it is more than 1 GiB, and more than the file.
-    """
-    if n_bytes > max(MOST_EXPANDED, file_bytes):
-        problem = f"{what} would be {n_bytes / 1e6:.0f} MB of numbers in a file of {file_bytes / 1e6:.3g} MB"
-        raise FileFormatError(path, f"{problem}; export shorter recordings, or without compression")
-
-
 def _same(known: str, name: str) -> bool:
     return last_part(known) == name or known.lstrip("/") == name.lstrip("/")
 

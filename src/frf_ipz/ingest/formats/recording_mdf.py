@@ -13,9 +13,9 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader, import_reader
-from frf_ipz.ingest.formats.file_arrays import require_size
+from frf_ipz.ingest.formats.file_arrays import MOST_EXPANDED
 from frf_ipz.ingest.formats.signal_table import Signal, SignalFormat, SignalTable
-from frf_ipz.input_files import read_bytes
+from frf_ipz.input_files import read_bytes, require_expanded
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,7 +38,7 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
     with errors_of_reader(path, KIND), asammdf.MDF(io.BytesIO(data)) as content:
         linear = LINEAR.get(content.version[0], set())
         sizes = [group.channel_group.cycles_nr * 8 * len(group.channels) for group in content.groups]
-        require_size(path, sum(sizes), len(data))
+        require_expanded(path, sum(sizes), file_bytes=len(data), most_bytes=MOST_EXPANDED)
         names = Counter(channel.name for group in content.groups for channel in group.channels)
         for number, group in enumerate(content.groups):
             for place, channel in enumerate(group.channels):

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frf_ipz.foreign_errors import errors_of_reader, import_reader
-from frf_ipz.ingest.formats.file_arrays import require_size
+from frf_ipz.ingest.formats.file_arrays import MOST_EXPANDED
 from frf_ipz.ingest.formats.signal_table import Signal, SignalFormat, SignalTable, even_times
-from frf_ipz.input_files import read_bytes
+from frf_ipz.input_files import read_bytes, require_expanded
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,7 +35,9 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
     with errors_of_reader(path, KIND):
         heads = nptdms.TdmsFile.read_metadata(io.BytesIO(data))
         channels = [channel for group in heads.groups() for channel in group.channels()]
-        require_size(path, sum(8 * len(channel) for channel in channels), len(data))
+        require_expanded(
+            path, sum(8 * len(channel) for channel in channels), file_bytes=len(data), most_bytes=MOST_EXPANDED
+        )
         content = nptdms.TdmsFile.read(io.BytesIO(data))
         names = Counter(channel.name for channel in channels)
         signals = []

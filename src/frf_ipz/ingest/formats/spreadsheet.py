@@ -12,7 +12,8 @@ import lazy_loader
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader
-from frf_ipz.ingest.formats.file_arrays import require_size
+from frf_ipz.ingest.formats.file_arrays import MOST_EXPANDED
+from frf_ipz.input_files import require_expanded
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -70,7 +71,9 @@ def _text(path: Path, data: bytes) -> bytes:
     with errors_of_reader(path, KIND):
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = archive.infolist()
-            require_size(path, sum(member.file_size for member in members), len(data))
+            require_expanded(
+                path, sum(member.file_size for member in members), file_bytes=len(data), most_bytes=MOST_EXPANDED
+            )
             for member in members:
                 if member.filename.endswith((".xml", ".rels")):
                     with archive.open(member) as part:

@@ -2,38 +2,43 @@
 
 from __future__ import annotations
 
-import io
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import lazy_loader
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.matrices.named_arrays import read_named
 from frf_ipz.fe.matrices.stored import MOST_BYTES, MatrixFormat, MatrixRequest, StoredMatrix
 from frf_ipz.foreign_errors import errors_of_reader
-from frf_ipz.input_files import read_bytes
+from frf_ipz.hdf5_files import SIGNATURE, Hdf5Tree, open_tree
+from frf_ipz.input_files import open_input
 from frf_ipz.matlab_files import read_matlab
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
+h5py = lazy_loader.load("h5py")  # slow to load, and most models do not need it
+
 KIND = "a MATLAB file"
 DEEPEST = 4  # structures within structures
 
 
 def _fits(path: Path, head: bytes) -> bool:
-    is_hdf5 = SIGNATURE in {head[:8], head[512:520]}
-    return path.suffix.lower() == ".mat" or head.startswith(b"MATLAB") or is_hdf5
+    return path.suffix.lower() == ".mat" or head.startswith(b"MATLAB") or _is_hdf5(head)
+
+
+def _is_hdf5(head: bytes) -> bool:
+    return SIGNATURE in {head[:8], head[512:520]}
 
 
 def _read(request: MatrixRequest) -> StoredMatrix:
-    data = read_bytes(request.path, most_bytes=MOST_BYTES)
-    if SIGNATURE in {data[:8], data[512:520]}:
-        with errors_of_reader(request.path, "a MATLAB file of version 7.3"):
-            return read_named(_arrays_of_hdf5(request.path, data), request)
+    with open_input(request.path) as stream:
+        is_hdf5 = _is_hdf5(stream.read(520))
+    if is_hdf5:
+        arrays = _arrays_of_hdf5(request.path)
+        with errors_of_reader(request.path, KIND):
+            return read_named(arrays, request)
     variables = read_matlab(request.path, most_bytes=MOST_BYTES)
     with errors_of_reader(request.path, KIND):
         return read_named(_flattened("", variables, 0), request)
@@ -60,48 +65,33 @@ def _flattened(way: str, variables: dict[str, Any], depth: int) -> dict[str, Any
     return found
 
 
-def _arrays_of_hdf5(path: Path, data: bytes) -> dict[str, Any]:
-    h5py = import_module("h5py")  # late: slow to load
+def _arrays_of_hdf5(path: Path) -> dict[str, Any]:
     found: dict[str, Any] = {}
-    budget = MOST_BYTES
-    with h5py.File(io.BytesIO(data), "r") as file:
-        for name in file:
-            if name.startswith("#") or not isinstance(file.get(name, getlink=True), h5py.HardLink):
+    with open_tree(path, "a MATLAB file of version 7.3", most_bytes=MOST_BYTES) as tree:
+        for name, member in tree.members(tree.file):
+            if name.startswith("#"):
                 continue
-            member = file[name]
-            parts = (
-                [member] if isinstance(member, h5py.Dataset) else [member.get(part) for part in ("data", "ir", "jc")]
-            )
-            if not all(isinstance(part, h5py.Dataset) for part in parts[:1] + parts[2:]):
-                continue
-            for part in parts:
-                if part is not None and (part.external or part.is_virtual):
-                    raise FileFormatError(path, f"'{name}' lies in another file; copy the data into this one")
-            budget -= sum(int(part.size) * part.dtype.itemsize for part in parts if part is not None)
-            if budget < 0:
-                raise FileFormatError(path, f"holds more than {MOST_BYTES >> 20} MB; is it damaged?")
-            found[name] = _numbers(member) if isinstance(member, h5py.Dataset) else _sparse(member)
+            if isinstance(member, h5py.Dataset):
+                found[name] = _numbers(tree, member)
+            elif isinstance(member.get("data"), h5py.Dataset) and "jc" in member and "ir" in member:
+                found[name] = _sparse(tree, member)
     return found
 
 
-def _numbers(dataset: Any) -> Any:  # noqa: ANN401 - h5py has no types
+def _numbers(tree: Hdf5Tree, dataset: Any) -> Any:  # noqa: ANN401 - h5py has no types
     """Give an array with its axes as MATLAB has them; texts as one text a row."""
-    values = np.asarray(dataset[()])
-    if values.dtype.names in {("real", "imag"), ("r", "i")}:
-        first, second = values.dtype.names
-        values = values[first] + 1j * values[second]
-    values = values.T
+    values = tree.read(dataset).T
     if dataset.attrs.get("MATLAB_class") == b"char" and values.dtype.kind in "iu":
         return np.array(["".join(map(chr, row)) for row in np.atleast_2d(values)])
     return values
 
 
-def _sparse(group: Any) -> Any:  # noqa: ANN401
+def _sparse(tree: Hdf5Tree, group: Any) -> Any:  # noqa: ANN401
     """Assemble a sparse matrix, whose places are checked first: SciPy trusts them."""
-    columns = np.asarray(group["jc"][()], np.int64).ravel()
-    values = _numbers(group["data"]).ravel()
-    rows = np.asarray(group["ir"][()], np.int64).ravel()
-    shape = (int(group.attrs["MATLAB_sparse"]), len(columns) - 1)
-    matrix: Any = sparse.csc_array((values, rows, columns), shape=shape)
+    columns = np.asarray(tree.read(group["jc"]), np.int64).ravel()
+    n_rows = int(group.attrs["MATLAB_sparse"])
+    values = tree.read(group["data"]).ravel()
+    rows = np.asarray(tree.read(group["ir"]), np.int64).ravel()
+    matrix: Any = sparse.csc_array((values, rows, columns), shape=(n_rows, len(columns) - 1))
     matrix.check_format(full_check=True)
     return sparse.csr_array(matrix)

@@ -11,20 +11,19 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader
-from frf_ipz.ingest.formats.file_arrays import require_size
-from frf_ipz.input_files import open_input
+from frf_ipz.input_files import open_input, require_expanded
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from frf_ipz.ingest.formats.file_arrays import NumericArray
+    from numpy.typing import NDArray
 
-h5py = lazy_loader.load("h5py")  # slow to load, and most recordings do not need it
+h5py = lazy_loader.load("h5py")  # slow to load, and most runs do not need it
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 DEEPEST = 32  # groups within groups
-MOST_OBJECTS = 20_000  # groups and data sets; a recording has some hundred
+MOST_OBJECTS = 20_000  # groups and data sets; a measurement or a model has some hundred
 MOST_TEXTS = 1000  # texts of a list, such as names of channels
 
 
@@ -40,11 +39,14 @@ class Hdf5Tree:
         As h5py has it.
     file_bytes : int
         Its size.
+    most_bytes : int
+        What may be read of it, where it is smaller.
     """
 
     path: Path
     file: Any
     file_bytes: int
+    most_bytes: int
     _n_objects: int = 0
     _n_bytes: int = 0
     _ancestors: list[Any] = field(default_factory=list)
@@ -85,13 +87,13 @@ class Hdf5Tree:
         Raises
         ------
         FileFormatError
-            If these are more than any recording has.
+            If these are more than any file of measurements or matrices has.
         """
         self._n_objects += 1
         if self._n_objects > MOST_OBJECTS:
-            raise FileFormatError(self.path, f"holds more than {MOST_OBJECTS} objects; is it a recording?")
+            raise FileFormatError(self.path, f"holds more than {MOST_OBJECTS} objects; is it the right file?")
 
-    def read(self, dataset: Any) -> NumericArray:  # noqa: ANN401
+    def read(self, dataset: Any) -> NDArray[Any]:  # noqa: ANN401
         """Read a data set of numbers.
 
         Parameters
@@ -112,7 +114,7 @@ class Hdf5Tree:
         if dataset.external or dataset.is_virtual:
             raise FileFormatError(self.path, f"'{dataset.name}' lies in another file; copy the data into this one")
         self._n_bytes += int(dataset.size) * dataset.dtype.itemsize
-        require_size(self.path, self._n_bytes, self.file_bytes)
+        require_expanded(self.path, self._n_bytes, file_bytes=self.file_bytes, most_bytes=self.most_bytes)
         values = np.asarray(dataset[()])
         names = values.dtype.names
         if names in {("real", "imag"), ("r", "i")}:
@@ -121,7 +123,7 @@ class Hdf5Tree:
 
 
 @contextmanager
-def open_tree(path: Path, kind: str) -> Iterator[Hdf5Tree]:
+def open_tree(path: Path, kind: str, *, most_bytes: int) -> Iterator[Hdf5Tree]:
     """Open an HDF5 file.
 
     Parameters
@@ -130,6 +132,8 @@ def open_tree(path: Path, kind: str) -> Iterator[Hdf5Tree]:
         The file.
     kind : str
         What it should be, for messages.
+    most_bytes : int
+        What may be read of it, where it is smaller.
 
     Yields
     ------
@@ -142,7 +146,7 @@ def open_tree(path: Path, kind: str) -> Iterator[Hdf5Tree]:
         If it is none, or is damaged.
     """
     with open_input(path) as stream, errors_of_reader(path, kind), h5py.File(stream, "r") as file:
-        yield Hdf5Tree(path=path, file=file, file_bytes=path.stat().st_size)
+        yield Hdf5Tree(path=path, file=file, file_bytes=path.stat().st_size, most_bytes=most_bytes)
 
 
 def texts_of(values: object) -> tuple[str, ...] | None:
