@@ -41,6 +41,13 @@ def test_a_mode_beyond_doubt_is_found_again():
     assert fit.modes["found_again"].to_numpy() == pytest.approx(1.0, abs=1e-6)
 
 
+def test_a_mode_at_the_edge_of_the_noise_may_be_lost():
+    fit = fitted(np.random.default_rng(3), 2.0, FREQUENCY_HZ)
+    assert mode_near(fit, STRONG)["found_again"].to_numpy() == pytest.approx(1.0, abs=1e-6)
+    (edge,) = mode_near(fit, WEAK)["found_again"]
+    assert 0.02 < edge < 0.98
+
+
 @pytest.mark.slow
 def test_it_is_the_share_of_new_measurements_that_have_the_mode():
     rng = np.random.default_rng(7)
