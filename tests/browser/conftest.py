@@ -33,6 +33,14 @@ def browser():
     chrome.quit()
 
 
+@pytest.fixture(scope="module", autouse=True)
+def nothing_of_other_tests(browser):
+    """Leave the last page of a module, and forget what it said: it goes on asking a server that has stopped."""
+    yield
+    browser.get("about:blank")
+    browser.get_log("browser")
+
+
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
     return make_demo(tmp_path_factory.mktemp("served"))

@@ -33,14 +33,20 @@ def frequencies(path, **options):
     return solve_modes(read_model(path), **options).natural_frequency_hz
 
 
+def library(name):
+    """Load a part of pyyeti, which would set NumPy's print options for all tests after this one."""
+    with np.printoptions():
+        return pytest.importorskip(name, reason="the extra 'nastran' is not installed")
+
+
 @pytest.fixture
 def op4():
-    return pytest.importorskip("pyyeti.nastran.op4", reason="the extra 'nastran' is not installed")
+    return library("pyyeti.nastran.op4")
 
 
 @pytest.fixture
 def nastran_files():
-    pyyeti = pytest.importorskip("pyyeti", reason="the extra 'nastran' is not installed")
+    pyyeti = library("pyyeti")
     folder = Path(pyyeti.__file__).parent / "tests" / "nas2cam_extseout"
     if not folder.is_dir():
         pytest.skip("this pyyeti came without its files of Nastran")
@@ -63,7 +69,7 @@ def test_a_matrix_of_output4_is_named(tmp_path, op4):
 
 def test_a_residual_structure_has_the_frequencies_that_nastran_computed(tmp_path, op4, nastran_files):
     """Rows by the USET of the OP2: sets, scalar points, displacement coordinate systems."""
-    op2 = pytest.importorskip("pyyeti.nastran.op2")
+    op2 = library("pyyeti.nastran.op2")
     nastran = op2.rdnas2cam(str(nastran_files / "nas2cam"))
     op4.write(str(tmp_path / "f.op4"), {"KAA": nastran["kaa"][0], "MAA": nastran["maa"][0]})
     shutil.copy(nastran_files / "nas2cam.op2", tmp_path / "f.op2")
