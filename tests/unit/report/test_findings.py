@@ -56,6 +56,7 @@ def test_what_nothing_explains_is_unknown(run):
     assert card_texts(replace(diagnosis, findings=()))[0] == "unknown"
     found = next(block for block in build(with_results(run, diagnosis=diagnosis)).blocks if isinstance(block, Table))
     assert [row[1] for row in found.rows] == ["looks like", "looks like", "alternative"]
+    assert [row[-1].startswith("If it were this: ") for row in found.rows] == [False, False, True]
 
 
 def test_measured_damping_is_nothing_missing(run):

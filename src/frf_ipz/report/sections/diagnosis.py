@@ -77,13 +77,18 @@ def _finding_table(diagnosis: Diagnosis) -> Table:
                 _parameters(finding),
                 probability_text(finding).removeprefix("= "),
                 number(finding.log_evidence_gain, 6),
-                typeset(finding.statement),
+                typeset(finding.statement if kind == found else _as_hypothesis(finding.statement)),
             ]
             for finding in entries
         ]
     columns = ("effect", "rank", "where", "parameters", "probability", "log Bayes factor", "in words")
     caption = "Findings and alternatives" if diagnosis.findings else "What was tried and is not needed"
     return Table(caption=caption, columns=columns, rows=rows, file="diagnosis.json")
+
+
+def _as_hypothesis(statement: str) -> str:
+    """An alternative is no fact: the data prefer what was found."""
+    return f"If it were this: {statement[:1].lower()}{statement[1:]}"
 
 
 def _parameters(finding: Finding) -> str:
