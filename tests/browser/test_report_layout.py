@@ -1,7 +1,4 @@
-"""The layout of the page in a real browser: what is chosen, labels of axes, narrow screens, paper, contrasts, axe."""
-
-import os
-from pathlib import Path
+"""The layout of the page in a real browser: what is chosen, labels of axes, narrow screens, paper, contrasts."""
 
 import pytest
 
@@ -178,22 +175,3 @@ def test_a_browser_that_cannot_unpack_the_library_says_so_and_shows_the_tables(b
         assert browser.find_element("css selector", "#state-space table").is_displayed()
     finally:
         browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", {"identifier": old["identifier"]})
-
-
-@pytest.mark.parametrize("width", [1280, 390])
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_axe_finds_no_fault(browser, written, page, theme, width):
-    axe = os.environ.get("AXE_CORE", "")
-    if not axe:
-        pytest.skip("needs axe-core: npm pack axe-core, and AXE_CORE=PATH/TO/axe.min.js")
-    resize(page, width)
-    prefer(page, theme)
-    open_page(browser, written)
-    page.execute_script("document.querySelectorAll('details').forEach((list) => { list.open = true; })")
-    page.execute_script(Path(axe).read_text(encoding="utf-8"))
-    page.set_script_timeout(120)
-    faults = page.execute_async_script(
-        "const done = arguments[arguments.length - 1];"
-        "axe.run(document).then((r) => done(r.violations.map((v) => [v.id, v.nodes.map((n) => n.html.slice(0, 120))])))"
-    )
-    assert faults == []
