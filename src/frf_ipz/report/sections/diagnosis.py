@@ -87,7 +87,7 @@ def _finding_table(diagnosis: Diagnosis) -> Table:
 
 
 def _as_hypothesis(statement: str) -> str:
-    """An alternative is no fact: the data prefer what was found."""
+    """Say it as no fact: the data prefer what was found."""
     return f"If it were this: {statement[:1].lower()}{statement[1:]}"
 
 
