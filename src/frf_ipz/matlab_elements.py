@@ -23,7 +23,7 @@ DTYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"
 NAMES, TEXTS = {INT8, UTF8}, {INT8, UINT8, UINT16, UTF8, UTF16, UTF32}
 CELL, STRUCT, OBJECT, CHAR, SPARSE, FUNCTION, OPAQUE = 1, 2, 3, 4, 5, 16, 17
 NUMERIC = range(6, 16)  # double, single, and integers of 8 to 64 bits
-IS_COMPLEX = 0x800
+IS_COMPLEX, IS_LOGICAL = 0x800, 0x200
 MOST_DIMENSIONS, MOST_DEPTH = 32, 50
 
 
@@ -107,11 +107,14 @@ class Elements:
                 self.take(NAMES)
             self.require_matrix()
             return
-        dimensions = [int(number) for number in self.take_numbers({INT32})]
+        dimensions = [int(number) for number in self.take_numbers({INT32, UINT32})]
         if not 0 < len(dimensions) <= MOST_DIMENSIONS or min(dimensions) < 0:
             raise DamagedError("a matrix has no dimensions, or a negative one")
         self.take(NAMES)
-        self._require_values(kind, dimensions, n_parts=1 + is_complex)
+        if kind == SPARSE:
+            self._require_sparse(dimensions, 1 + is_complex, is_logical=bool(int(flags[0]) & IS_LOGICAL))
+        else:
+            self._require_values(kind, dimensions, n_parts=1 + is_complex)
 
     def _require_values(self, kind: int, dimensions: list[int], *, n_parts: int) -> None:
         number = math.prod(dimensions)
@@ -119,10 +122,10 @@ class Elements:
             if any(len(self.take_numbers()) != number for _ in range(n_parts)):
                 raise DamagedError("a matrix has not as many numbers as its dimensions say")
         elif kind == CHAR:
-            if number > self.take(TEXTS)[2]:
+            length = self.take(TEXTS)[2]
+            is_blank = not length and number <= TAG_BYTES  # some programs write no letters where all are blanks
+            if number > length and not is_blank:
                 raise DamagedError("a text has fewer letters than its dimensions say")
-        elif kind == SPARSE:
-            self._require_sparse(dimensions, n_parts)
         elif kind in {CELL, FUNCTION}:
             self.require_matrices(number if kind == CELL else 1)
         elif kind in {STRUCT, OBJECT}:
@@ -130,7 +133,7 @@ class Elements:
         else:
             raise DamagedError(f"a matrix is of the class {kind}")
 
-    def _require_sparse(self, dimensions: list[int], n_parts: int) -> None:
+    def _require_sparse(self, dimensions: list[int], n_parts: int, *, is_logical: bool) -> None:
         if len(dimensions) != 2:
             raise DamagedError("a sparse matrix has not two dimensions")
         rows, columns = (self.take_numbers({INT32, UINT32}) for _ in range(2))
@@ -140,13 +143,16 @@ class Elements:
         used = rows[:n_entries].astype(np.int64)
         if len(used) < n_entries or (used < 0).any() or (used >= dimensions[0]).any():
             raise DamagedError("an entry of a sparse matrix lies outside it")
-        if any(len(self.take_numbers()) < n_entries for _ in range(n_parts)):
+        if is_logical:  # of one byte each, whatever the type says
+            if self.take(DTYPES.keys())[2] < n_entries:
+                raise DamagedError("entries of a sparse matrix are missing")
+        elif any(len(self.take_numbers()) < n_entries for _ in range(n_parts)):
             raise DamagedError("entries of a sparse matrix are missing")
 
     def _require_fields(self, number: int, *, has_class: bool) -> None:
         if has_class:
             self.take(NAMES)
-        width = self.take_numbers({INT32})
+        width = self.take_numbers({INT32, UINT32})
         _, _, length = self.take(NAMES)
         if len(width) != 1 or width[0] <= 0 or length % width[0]:
             raise DamagedError("the names of fields have no length")

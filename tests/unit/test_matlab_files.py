@@ -92,6 +92,66 @@ def test_all_that_can_be_written_is_read(tmp_path):
     assert back["cells"].ravel()[1][0] == "text"
 
 
+def element(kind, content):
+    return struct.pack("<II", kind, len(content)) + content.ljust(-(-len(content) // 8) * 8, b"\0")
+
+
+def matrix(flags, *parts, dimensions=(1, 1), dimensions_kind=5):
+    content = element(6, struct.pack("<II", flags, 8)) + element(dimensions_kind, struct.pack("<2i", *dimensions))
+    content += element(1, b"v") + b"".join(parts)
+    return struct.pack("<II", 14, len(content)) + content
+
+
+LOGICAL_SPARSE = matrix(
+    0x205,
+    element(5, struct.pack("<3i", 0, 1, 2)),
+    element(5, struct.pack("<4i", 0, 1, 1, 3)),
+    element(9, b"\1\1\1"),  # one byte each under the type of eight
+    dimensions=(3, 3),
+)
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        (LOGICAL_SPARSE, [[1, 0, 0], [0, 0, 1], [0, 0, 1]]),
+        (matrix(6, element(9, struct.pack("<2d", 3, 4)), dimensions=(1, 2), dimensions_kind=6), [[3, 4]]),
+    ],
+    ids=["logical, sparse", "dimensions without a sign"],
+)
+def test_what_other_programs_write_is_read(tmp_path, body, expected):
+    path = tmp_path / "a.mat"
+    path.write_bytes(header() + body)
+    value = read_matlab(path)["v"]
+    np.testing.assert_array_equal(value.toarray() if scipy.sparse.issparse(value) else value, expected)
+
+
+def test_a_blank_needs_no_letter_and_many_blanks_do(tmp_path):
+    path = tmp_path / "a.mat"
+    path.write_bytes(header() + matrix(4, element(16, b"")))
+    assert read_matlab(path)["v"] == [" "]
+    path.write_bytes(header() + matrix(4, element(16, b""), dimensions=(1, 1 << 28)))
+    with pytest.raises(FileFormatError, match="fewer letters"):
+        read_matlab(path)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        matrix(6, element(9, struct.pack("<d", 3)), dimensions=(-1, -1), dimensions_kind=6),
+        matrix(
+            0x205, element(5, bytes(12)), element(5, struct.pack("<2i", 0, 3)), element(9, b"\1"), dimensions=(3, 1)
+        ),
+    ],
+    ids=["negative dimensions", "logical entries missing"],
+)
+def test_what_no_program_writes_is_refused(tmp_path, body):
+    path = tmp_path / "a.mat"
+    path.write_bytes(header() + body)
+    with pytest.raises(FileFormatError, match="damaged"):
+        read_matlab(path)
+
+
 def test_a_changed_byte_gives_values_or_the_error_of_the_project(tmp_path):
     path = tmp_path / "a.mat"
     savemat(path, RICH, do_compression=False)
