@@ -174,7 +174,8 @@ class FrfKeys:
     output_dof, input_dof : str or tuple of str, optional
         Needed for a file that does not say what it connects; lists for a file of arrays that holds several FRFs.
     columns : tuple of str
-        What the columns of a text file with one FRF are: ``frequency_hz``; ``real`` and ``imag``, or ``magnitude`` or
+        What the columns of a text file with one FRF are: ``frequency_hz``, ``frequency_rad_s``, or ``frequency`` in
+        the unit that the header states; ``real`` and ``imag``, or ``magnitude`` or
         ``magnitude_db`` with ``phase_deg`` or ``phase_rad``; ``coherence``, ``variance``, ``skip``.
     skip_rows : int
         Lines before the numbers of a text file; further lines of text are skipped without being counted.

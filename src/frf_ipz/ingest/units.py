@@ -271,10 +271,29 @@ def frequency_factor(unit: str) -> float:
     >>> frequency_factor("kHz"), frequency_factor("cpm") * 60
     (1000.0, 1.0)
     """
-    name = unit.strip(" []()").lower()
-    if name not in FREQUENCIES and is_stated(unit):
+    if not is_frequency_unit(unit) and is_stated(unit):
         raise QuantityError(f"'{unit}' is no unit of frequency; expected is {', '.join(FREQUENCIES)}")
-    return FREQUENCIES.get(name, 1.0)
+    return FREQUENCIES.get(_frequency_name(unit), 1.0)
+
+
+def is_frequency_unit(text: str) -> bool:
+    """Tell whether a text is a unit of frequency.
+
+    Parameters
+    ----------
+    text : str
+        What may be one.
+
+    Returns
+    -------
+    bool
+        True for ``Hz``, ``rad/s``, ``rpm`` and the like.
+    """
+    return _frequency_name(text) in FREQUENCIES
+
+
+def _frequency_name(unit: str) -> str:
+    return unit.strip(" []()").lower()
 
 
 def unit_ratio(first: str, second: str) -> float | None:

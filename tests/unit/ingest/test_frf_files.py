@@ -148,6 +148,39 @@ def test_text_with_magnitude_and_phase(tmp_path, columns, make):
     np.testing.assert_allclose(frfs.values[:, 0], values, rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("name", "factor", "column"),
+    [
+        ("omega", 2 * np.pi, "frequency_rad_s"),
+        ("Frequency [rad/s]", 2 * np.pi, "frequency_rad_s"),
+        ("f [kHz]", 1e-3, "frequency"),
+        ("freq (Hz)", 1.0, "frequency_hz"),
+    ],
+)
+def test_frequencies_are_read_in_the_unit_of_the_header(tmp_path, name, factor, column):
+    def write(name):
+        head = f"an analyser\n{name}\treal\timag\n"
+        rows = np.column_stack([LINES_HZ * factor, VALUES[:, 0].real, VALUES[:, 0].imag])
+        (tmp_path / "frf.txt").write_text(head + "\n".join("\t".join(map(repr, row)) for row in rows.tolist()))
+
+    write(name)
+    frfs = read(tmp_path, text_entry([column, "real", "imag"])).frfs
+    np.testing.assert_allclose(frfs.frequency_hz, LINES_HZ, rtol=1e-12)
+    by_header = read(tmp_path, entry("frf.txt", output_dof="1:+z", input_dof="7:+z")).frfs
+    np.testing.assert_allclose(by_header.frequency_hz, LINES_HZ, rtol=1e-12)
+    if column != "frequency_hz":
+        says = message(tmp_path, text_entry(["frequency_hz", "real", "imag"]))
+        assert re.search(rf"frf\.txt: its header gives frequencies in .* says frequency_hz; write {column} there", says)
+
+
+def test_a_line_that_stands_there_twice_is_named(tmp_path):
+    long_csv(tmp_path)
+    lines = (tmp_path / "frf.csv").read_text().splitlines()
+    (tmp_path / "frf.csv").write_text("\n".join([*lines[:5], lines[4], *lines[5:]]))
+    says = message(tmp_path, entry())
+    assert re.search(r"frf\.csv, line 6, column 'frequency_hz': .* a second time, after line 5", says)
+
+
 def test_columns_may_be_skipped(tmp_path):
     text_file(tmp_path, [LINES_HZ, LINES_HZ, VALUES[:, 0].imag, np.full(len(LINES_HZ), 0.5), VALUES[:, 0].real])
     frfs = read(tmp_path, text_entry(["frequency_hz", "skip", "imag", "coherence", "real"])).frfs
@@ -246,7 +279,10 @@ def test_masses_and_scale_are_handed_on(tmp_path):
         (lambda text: text.replace("\n0.5,1:+z,7:+z,", "\n0.5,1:+z,7:+z,x", 1), "line 3, column 'real'.*'x"),
         (lambda text: text.replace("\n0.5,1:+z,7:+z,", "\n0.5,1:+z,7:+z,,", 1), "line 3: has 6 values.*5 columns"),
         (lambda text: text.replace("\n0.5,1:+z", "\nnan,1:+z", 1), "line 3, column 'frequency_hz'.*'nan'"),
-        (lambda text: text.replace("\n0.5,1:+z", "\n0.0,1:+z", 1), "1:\\+z / 7:\\+z do not ascend from 0"),
+        (
+            lambda text: text.replace("\n0.5,1:+z", "\n0.0,1:+z", 1),
+            "line 3, .* has 0 of 1:\\+z / 7:\\+z a second time, after line 2",
+        ),
         (lambda text: text[: len(text) // 2].rpartition(",")[0], "cut off"),
         (lambda text: text.splitlines()[0], "no line that begins with a number"),
         (lambda _: "", "is empty"),
@@ -276,7 +312,7 @@ def test_values_that_cannot_be(tmp_path):
         (lambda: entry(unit="m/N"), "'m/N' is no unit of accelerance; expected is a unit like m/s\\^2/N"),
         (lambda: entry(unit="quark"), "'quark' is no unit that can be read"),
         (lambda: text_entry(["frequency_hz", "real", "imagin"]), "'columns' names 'imagin'; did you mean 'imag'"),
-        (lambda: text_entry(["frequency_hz", "real"]), "needed are frequency_hz and either real and imag"),
+        (lambda: text_entry(["frequency_hz", "real"]), "needed are frequency_hz .* and either real and imag"),
         (lambda: text_entry(["frequency_hz", "real", "imag", "coherence"]), "has 3 columns, but 'columns'.*names 4"),
         (lambda: entry("frf.txt", columns=("frequency_hz", "real", "imag")), "needs 'output_dof' and 'input_dof'"),
         (lambda: text_entry(["frequency_hz", "real", "imag"], output="1:q"), r"\[\[frf\]\] 'frf.txt'.*1:q"),

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
 ROLES = (  # of a column, by its name; the first that fits
-    ("frequency_hz", re.compile(r"freq|^f$|^f ?\[|\bhz\b", re.IGNORECASE)),
+    (frf_text.STATED, re.compile(r"freq|^f$|^f ?\[|\bhz\b|^w ?\[|^w$|omega", re.IGNORECASE)),
     ("coherence", re.compile(r"coh|gamma", re.IGNORECASE)),
     ("imag", re.compile(r"imag|^im\b", re.IGNORECASE)),
     ("real", re.compile(r"real|^re\b", re.IGNORECASE)),
@@ -115,11 +115,12 @@ def find_frf_columns(source: FrfSource) -> AnalyserColumns | None:
         if (
             len(roles) == layout.n_columns
             and is_complete
-            and roles[0] == "frequency_hz"
+            and roles[0] == frf_text.STATED
             and len(set(named)) == len(named)
         ):
             unit, quantity = _unit_of(layout, words)
-            return AnalyserColumns(columns=tuple(roles), unit=unit, quantity=quantity)
+            frequency = frf_text.name_of_frequency(frf_text.stated_frequency_unit(layout, 0))
+            return AnalyserColumns(columns=(frequency, *roles[1:]), unit=unit, quantity=quantity)
     return None
 
 

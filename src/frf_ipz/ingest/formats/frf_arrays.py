@@ -17,6 +17,7 @@ from frf_ipz.dofs import AnyDof, Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, did_you_mean
 from frf_ipz.ingest.formats.file_arrays import FileArrays, describe, last_part
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
+from frf_ipz.ingest.formats.frf_text import ANGULAR
 from frf_ipz.ingest.formats.recording_arrays import RATE
 from frf_ipz.ingest.formats.registry import find_array_format
 from frf_ipz.ingest.formats.testlab_arrays import points_of, testlab_blocks
@@ -33,7 +34,6 @@ GRID = ("frequency_step_hz", "frequency_start_hz")
 SAMPLE_RATE = "sample_rate_hz"  # the lines go from 0 Hz to half of it
 KNOWN = (*FREQUENCIES, *GRID, SAMPLE_RATE, *PARTS, "coherence", "variance")
 FREQUENCY = re.compile(r"(f|ff|freq\w*|frf?_?freq\w*|frequenz\w*|hz|f_?(vec|axis|hz)\w*|x)", re.IGNORECASE)
-ANGULAR = re.compile(r"(w|omega\w*|om|rad_?s|w_?(vec|axis)\w*)", re.IGNORECASE)
 COHERENCE = re.compile(r"(coh|gamma2?|cxy)\w*", re.IGNORECASE)
 OUTPUTS = re.compile(r"(output|response|out)_?(dofs?|names?|points?|channels?)", re.IGNORECASE)
 INPUTS = re.compile(r"(input|reference|excitation|in|ref)_?(dofs?|names?|points?|channels?)", re.IGNORECASE)

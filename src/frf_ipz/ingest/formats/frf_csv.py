@@ -11,7 +11,7 @@ from frf_ipz.dofs import AnyDof, parse_label
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import TextLayout, sniff
-from frf_ipz.ingest.formats.text_table import column_index, not_a_number, read_blocks
+from frf_ipz.ingest.formats.text_table import column_index, not_a_number, read_blocks, require_once
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -39,6 +39,8 @@ class _LongCsv:
             groups.setdefault(pair, []).append(row)
         dofs = {text: _parse_dof(layout, text) for pair in groups for text in pair}
         values = {name: table[name].to_numpy() for name in table.column_names if name not in LABELS}
+        for (output, input_), rows in groups.items():
+            require_once(layout, "frequency_hz", values["frequency_hz"][rows], rows, f"{output} / {input_}")
         return tuple(
             _make_frf(source, dofs[output], dofs[input_], {name: array[rows] for name, array in values.items()})
             for (output, input_), rows in groups.items()

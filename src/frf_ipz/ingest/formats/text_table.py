@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import islice
 from typing import TYPE_CHECKING, BinaryIO
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv as arrow_csv
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
+    from frf_ipz.arrays import FloatArray, IntArray
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
 BLOCK_BYTES = 1 << 22
@@ -180,6 +182,35 @@ def not_a_number(layout: TextLayout, names: Sequence[str], numeric: Sequence[int
     return FileFormatError(
         layout.path, "holds a value that is infinite or absurdly large; correct the file", where=f"line {line}"
     )
+
+
+def require_once(layout: TextLayout, name: str, values: FloatArray, rows: Sequence[int] | IntArray, owner: str) -> None:
+    """Refuse a value that stands in two rows.
+
+    Parameters
+    ----------
+    layout : TextLayout
+        The file's layout.
+    name : str
+        Of the column.
+    values : (n,) array
+        Its values in some rows.
+    rows : (n,) sequence of int
+        The rows.
+    owner : str
+        What may have each value once, for the message.
+
+    Raises
+    ------
+    FileFormatError
+        If one comes again; names both lines.
+    """
+    order = np.argsort(values, kind="stable")
+    again = np.flatnonzero(np.diff(values[order]) == 0.0)
+    if again.size:
+        first, second = (line_of_row(layout, int(rows[order[again[0] + place]])) for place in (0, 1))
+        problem = f"has {values[order[again[0]]]:g} of {owner} a second time, after line {first}; take one of them out"
+        raise FileFormatError(layout.path, problem, where=f"line {second}, column '{name}'")
 
 
 def _bad_length(layout: TextLayout, number: int, length: int, expected: int, *, is_last: bool) -> FileFormatError:
