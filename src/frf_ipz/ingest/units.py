@@ -3,6 +3,8 @@
 pint reads units here and nowhere else; behind this module every value is SI. Before pint sees it, a text is brought
 from the ways of analysers to that of pint: ``m/s2``, ``ms-2``, ``(1/N)*(g)``. In tests of vibrations ``g`` is the
 acceleration of gravity and ``lb`` the pound of force: no gram and no mass is measured.
+
+To load pint and its registry takes a third of a second: units that most recordings are in are known without it.
 """
 
 from __future__ import annotations
@@ -10,12 +12,16 @@ from __future__ import annotations
 import math
 import re
 from functools import cache
+from importlib import import_module
 from tokenize import TokenError
-
-import pint
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 from frf_ipz.errors import QuantityError
 from frf_ipz.quantities import FrfQuantity, frf_quantity_of
+
+if TYPE_CHECKING:
+    import pint
 
 EXAMPLES = {
     "force": "N, kN or lbf",
@@ -24,9 +30,15 @@ EXAMPLES = {
     "displacement": "m, mm or um",
     "time": "s or ms",
 }
+USUAL = {  # the factors that pint gives
+    "force": {"N": 1.0, "kN": 1000.0},
+    "acceleration": {"m/s^2": 1.0, "m/s2": 1.0, "m/s**2": 1.0, "m/s²": 1.0, "g": 9.80665},
+    "velocity": {"m/s": 1.0},
+    "displacement": {"m": 1.0},
+    "time": {"s": 1.0},
+}
 MOTIONS = ("acceleration", "velocity", "displacement")
-UNREADABLE = (
-    pint.PintError,
+UNREADABLE = (  # beside pint's own
     ArithmeticError,
     AssertionError,
     AttributeError,
@@ -140,6 +152,8 @@ def unit_factor(unit: str, quantity: str, *, rotational: bool = False) -> float:
     >>> unit_factor("g_0", "acceleration")
     9.80665
     """
+    if not rotational and unit in USUAL.get(quantity, {}):
+        return USUAL[quantity][unit]
     return _convert(
         _parse(unit), si_unit(quantity, rotational=rotational), f"'{unit}' is no unit of {quantity}", quantity
     )
@@ -245,6 +259,8 @@ def frf_factor(unit: str, quantity: FrfQuantity, output_direction: str, input_di
     0.001
     """
     si = quantity.unit(output_direction, input_direction)
+    if unit == si:
+        return 1.0
     return _convert(_parse(unit), si, f"'{unit}' is no unit of {quantity.value}", "")
 
 
@@ -319,7 +335,7 @@ def unit_ratio(first: str, second: str) -> float | None:
         ratio = float((_parse(first) / _parse(second)).to("").magnitude)
     except QuantityError:
         return None
-    except pint.PintError:
+    except _pint().PintError:
         return math.nan
     return 1.0 if abs(ratio - 1.0) < SAME else ratio
 
@@ -342,6 +358,8 @@ def is_unit(text: str) -> bool:
     >>> is_unit("mm/s2"), is_unit("Volt"), is_unit("force"), is_unit("1")
     (True, True, False, False)
     """
+    if any(text in units for units in USUAL.values()):
+        return True
     try:
         unit = _parse(text) if is_stated(text) else None
     except QuantityError:
@@ -365,9 +383,14 @@ def is_stated(text: str) -> bool:
     return text.strip().lower() not in NOT_STATED
 
 
+def _pint() -> ModuleType:
+    return import_module("pint")  # late: see above
+
+
 @cache
 def _registry() -> pint.UnitRegistry[float]:
-    return pint.UnitRegistry()
+    registry: pint.UnitRegistry[float] = _pint().UnitRegistry()
+    return registry
 
 
 @cache
@@ -376,7 +399,7 @@ def _parse(text: str) -> pint.Quantity[float]:
     try:
         value: pint.Quantity[float] = _registry().Quantity(_registry().parse_expression(expression)) * 1.0
         value.to_base_units()
-    except UNREADABLE:
+    except (_pint().PintError, *UNREADABLE):
         comma = "; write its number with a decimal point" if "," in text else ""
         examples = "write it as in N, m/s^2, g, mm/s or um"
         raise QuantityError(f"'{text}' is no unit that can be read; {examples}{comma}") from None
@@ -408,7 +431,7 @@ def _word(word: str, words: dict[str, str]) -> str:
 def _convert(value: pint.Quantity[float], si: str, problem: str, quantity: str) -> float:
     try:
         factor = float(value.to(si).magnitude)
-    except pint.PintError:
+    except _pint().PintError:
         hint = EXAMPLES.get(quantity) or f"a unit like {si}"
         other = [name for name in MOTIONS if quantity in MOTIONS and value.is_compatible_with(si_unit(name))]
         instead = f', or quantity = "{other[0]}"' if other else ""

@@ -1,6 +1,8 @@
 """Units are read by pint; what is no unit of its quantity is refused."""
 
 import math
+import subprocess
+import sys
 
 import pytest
 from hypothesis import given
@@ -8,6 +10,8 @@ from hypothesis import strategies as st
 
 from frf_ipz.errors import QuantityError
 from frf_ipz.ingest.units import (
+    USUAL,
+    _parse,
     frf_factor,
     is_unit,
     numerator_of,
@@ -57,6 +61,17 @@ POUND_FORCE, GRAVITY = 4.4482216152605, 9.80665  # by definition
 )
 def test_units_of_signals(unit, quantity, factor):
     assert unit_factor(unit, quantity) == pytest.approx(factor, rel=1e-12)
+
+
+def test_units_that_are_known_without_pint_are_as_pint_gives_them():
+    factors = {(quantity, unit): factor for quantity, units in USUAL.items() for unit, factor in units.items()}
+    assert factors == {(quantity, unit): _parse(unit).to(si_unit(quantity)).magnitude for quantity, unit in factors}
+
+
+def test_a_usual_unit_does_not_load_pint():
+    code = "import sys, frf_ipz.ingest.units as u; u.unit_factor('g', 'acceleration'); print('pint' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
 
 
 def test_units_of_rotations():
