@@ -33,9 +33,10 @@ LONGEST_S = 120.0  # a command takes seconds
 class Command:
     """A command that is at work in a process of its own.
 
-    `killed_before` kills it before the change of that number; `refused` is an ``errno`` by which the system refuses the
-    change `refused_at`, or all that need room on the disk from `refused_from` on. Numbers are counted among the changes
-    below `within`. No file gets larger than `most_bytes`. Other `work` than the command line is a function.
+    `killed_before` kills it before the change of that number, `stopped_before` asks it to stop; `refused` is an
+    ``errno`` by which the system refuses the change `refused_at`, or all that need room on the disk from `refused_from`
+    on. Numbers are counted among the changes below `within`. No file gets larger than `most_bytes`. Other
+    `work` than the command line is a function.
     """
 
     def __init__(self, *arguments, log, work=None, within=None, most_bytes=None, **faults):
@@ -141,13 +142,17 @@ def impatient(*arguments):
     command_line(*arguments)
 
 
-def _watch(counter, *, within, killed_before=None, refused=None, refused_at=None, refused_from=None):
+def _watch(
+    counter, *, within, killed_before=None, stopped_before=None, refused=None, refused_at=None, refused_from=None
+):
     def note(event, arguments):
         if not _changes(event, arguments, within):
             return
         number, counter.value = counter.value, counter.value + 1
         if number == killed_before:
             os.kill(os.getpid(), signal.SIGKILL)
+        if number == stopped_before:
+            os.kill(os.getpid(), signal.SIGINT)
         is_full = refused_from is not None and number >= refused_from and event in NEED_ROOM
         if number == refused_at or is_full:
             raise OSError(refused, os.strerror(refused), str(arguments[0]))

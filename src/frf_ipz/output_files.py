@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 BESIDE = ".frf-ipz-"  # how the name begins of a file that is not whole yet; then which machine and process write it
 LONGEST_SUFFIX = len(".parquet")  # an ending that a writer may look at; the name in all must not be too long
@@ -88,6 +88,21 @@ def remove_litter(folder: Path) -> None:
             match = name.fullmatch(path.name)
             if match and path.is_file() and not path.is_symlink() and _has_ended(int(match["process"])):
                 path.unlink()
+
+
+def to_its_end(clear_up: Callable[[], None]) -> None:
+    """Clear up, and once more where a signal came meanwhile: it is raised when all is done.
+
+    Parameters
+    ----------
+    clear_up : callable
+        Takes no harm from being called twice.
+    """
+    try:
+        clear_up()
+    except BaseException:
+        clear_up()
+        raise
 
 
 def _machine() -> str:

@@ -1,4 +1,7 @@
-"""A command that is killed at any moment leaves the old results or the new ones, whole, and the next one is as ever."""
+"""A command that ends at any moment leaves the old results or the new ones, whole, and the next one is as ever.
+
+One that is killed leaves work to the next; one that is asked to stop clears up behind itself.
+"""
 
 import os
 import random
@@ -23,6 +26,7 @@ QUICK_SEARCH = '[diagnose]\neffects = ["global_stiffness"]\n'
 N_MOMENTS = 4  # of the changes of each verb, in the fast tests
 N_TRIALS = int(os.environ.get("TRIALS", "1"))  # a long proof asks for 10: every change, and 100 moments at random
 OTHER_BAND = "580.0"
+STOPPED = 128 + signal.SIGINT
 
 
 @dataclass(frozen=True)
@@ -127,6 +131,19 @@ def test_killed_before_any_change_it_is_the_old_or_the_new_whole(cases, verb):
     first = found.index(case.new)
     assert first > 0
     assert found == [case.old] * first + [case.new] * (len(moments) - first)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("verb", VERBS)
+def test_stopped_before_any_change_nothing_is_left_lying_about(cases, verb):
+    case = cases(verb)
+    for number in range(0, case.n_changes, 1 if N_TRIALS > 1 else 7):
+        out = case.copy(case.folder / "stopped")
+        command = case.start(out, stopped_before=number)
+        status = command.wait()
+        found = results_of(out)
+        assert (status, found) in ((STOPPED, case.old), (STOPPED, case.new), (0, case.new)), f"change {number}"
+        assert faults_after_a_command(out) == [], f"change {number}"
 
 
 @pytest.mark.slow

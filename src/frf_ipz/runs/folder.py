@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 from frf_ipz import __version__
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.input_files import digest_file
-from frf_ipz.output_files import cannot_write, write_text
+from frf_ipz.output_files import cannot_write, to_its_end, write_text
 from frf_ipz.progress import silent
 from frf_ipz.runs.codec import load_result, save_result
-from frf_ipz.runs.folder_lock import HOLDER, LOCK, lock_folder
+from frf_ipz.runs.folder_lock import lock_folder
 from frf_ipz.runs.generations import HIDDEN, Generations, current_folder, forget_empty
 from frf_ipz.runs.manifest import MANIFEST, load_manifest
 from frf_ipz.runs.stage_file import SUFFIX
@@ -353,7 +353,7 @@ def open_run(path: Path, *, progress: Progress = silent) -> Iterator[RunFolder]:
             made = [folder for folder in (path, *path.parents) if not folder.exists()]
             stack.enter_context(_removing_if_empty(made))
             stack.enter_context(lock_folder(path, hidden, progress=progress))
-            stack.enter_context(_removing_hidden(hidden))
+            stack.enter_context(_removing_hidden(path))
             generations = Generations(path=path)
         stack.callback(generations.abandon)
         manifest = {key: value for key, value in read_manifest(path).items() if key != "notes"}
@@ -383,17 +383,14 @@ def _removing_if_empty(folders: Iterable[Path]) -> Iterator[None]:
 
 
 @contextmanager
-def _removing_hidden(hidden: Path) -> Iterator[None]:
+def _removing_hidden(path: Path) -> Iterator[None]:
     """Remove what the program keeps for itself, where there are no results: while it holds the lock, before others."""
     try:
         yield
     finally:
-        if not holds_run(hidden.parent):
+        if not holds_run(path):
             with suppress(OSError):
-                forget_empty(hidden.parent)
-                (hidden / HOLDER).unlink(missing_ok=True)
-                (hidden / LOCK).unlink(missing_ok=True)
-                hidden.rmdir()
+                to_its_end(lambda: forget_empty(path))
 
 
 def holds_run(path: Path) -> bool:

@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.json_files import read_json
-from frf_ipz.output_files import write_text
+from frf_ipz.output_files import to_its_end, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,7 +37,7 @@ def lock_folder(path: Path, hidden: Path, *, progress: Progress) -> Iterator[Non
     path : Path
         The folder, for messages.
     hidden : Path
-        Where the lock is; made where there is none.
+        Where the lock is; made where there is none, and removed where nothing is kept there at the end.
     progress : Progress
         Told for whom it waits.
 
@@ -49,16 +49,26 @@ def lock_folder(path: Path, hidden: Path, *, progress: Progress) -> Iterator[Non
         If the lock cannot be made.
     """
     lock = FileLock(hidden / LOCK)
-    _acquire(lock, path, hidden, progress)
     try:
+        _acquire(lock, path, hidden, progress)
         since = datetime.now().astimezone().isoformat(timespec="seconds")
         command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
         write_text(hidden / HOLDER, json.dumps({"pid": os.getpid(), "command": command, "since": since}))
         yield
     finally:
-        with suppress(OSError):
+        to_its_end(lambda: _leave(lock, hidden))
+
+
+def _leave(lock: FileLock, hidden: Path) -> None:
+    """Give the lock back; where nothing is kept in its folder, both go, before another command can take it."""
+    with suppress(OSError):
+        if lock.is_locked:
             (hidden / HOLDER).unlink(missing_ok=True)
-        lock.release()
+            if [entry.name for entry in hidden.iterdir()] == [LOCK]:
+                (hidden / LOCK).unlink()
+        if not any(hidden.iterdir()):
+            hidden.rmdir()
+    lock.release()
 
 
 def _acquire(lock: FileLock, path: Path, hidden: Path, progress: Progress) -> None:

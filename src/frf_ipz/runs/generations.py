@@ -45,6 +45,7 @@ from frf_ipz.output_files import (
     replacing,
     sync,
     sync_folder,
+    to_its_end,
     write_text,
 )
 
@@ -135,7 +136,11 @@ class Generations:
         self.current = current_folder(self.path)
         self.number = 1 if number is None else number + 1
         self.staging = _generation(self.path, self.number)
-        self.staging.mkdir(parents=True)
+        try:
+            self.staging.mkdir(parents=True)
+        except BaseException:
+            self.abandon()
+            raise
 
     def adopt(self, names: Iterable[str]) -> None:
         """Make a generation of what an older version has left, or of nothing, so that one is always current.
@@ -216,12 +221,12 @@ class Generations:
                 self._take_back(placing, self.staging)
                 _remove(placing)
             raise
-        self._clear_up(self.number)
+        to_its_end(lambda: self._clear_up(self.number))
 
     def abandon(self) -> None:
         """Remove what was written for a generation that did not come about."""
         if _current_number(self.path) != self.number:
-            _remove(self.staging)
+            to_its_end(lambda: _remove(self.staging))
 
     def _clear_up(self, number: int | None) -> None:
         """Remove all that is not current; what a killed process has placed of it is taken back before."""
@@ -265,9 +270,9 @@ def forget_empty(path: Path) -> None:
         If anything is kept, which stays.
     """
     hidden = path / HIDDEN
-    with suppress(FileNotFoundError):
-        _generation(path, 0).rmdir()
-    (hidden / GENERATIONS).rmdir()
+    for folder in (_generation(path, 0), hidden / GENERATIONS):
+        with suppress(FileNotFoundError):
+            folder.rmdir()
     (hidden / POINTER).unlink(missing_ok=True)
 
 
