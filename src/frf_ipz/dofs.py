@@ -15,6 +15,7 @@ GENERALISED = "q"  # the amplitude of a mode or of a super-element's motion, whi
 UNITS = ("m", "rad")
 DOFS_SHOWN = 6
 _LABEL = re.compile(r"^\s*([0-9]{1,18})\s*:\s*([+-]?)\s*(r?[xyz])\s*$")
+_LABELS_WITHIN = re.compile(r"\d+:[-+]?r?[xyz]")
 _PORT = re.compile(r"(?!(r?[xyz]|[0-9]+)$)[^:+\-\s][^:]*")  # no direction or node alone: half of a label
 _DIRECTION = re.compile(r"[+-]?r?[xyz]")
 
@@ -350,7 +351,10 @@ def parse_dof(text: str) -> Dof:
     """
     match = _LABEL.match(text) if isinstance(text, str) else None
     if match is None:
-        raise InputError(f"'{text}' is no DOF label; expected NODE:SIGN DIRECTION as in '18:+z', '20:-z' or '7:rz'")
+        is_sum = len(_LABELS_WITHIN.findall(str(text))) > 1 or ("(" in str(text) and ":" in str(text))
+        way_out = "; a sum or a multiple of DOFs is a [[port]] of model.toml, and its name stands here" if is_sum else ""
+        expected = "expected NODE:SIGN DIRECTION as in '18:+z', '20:-z' or '7:rz'"
+        raise InputError(f"'{text}' is no DOF label; {expected}{way_out}")
     node, sign, direction = match.groups()
     return Dof(int(node), direction, -1 if sign == "-" else 1)
 

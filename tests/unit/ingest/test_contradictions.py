@@ -246,7 +246,7 @@ def test_records_that_begin_at_the_peak_say_nothing_of_the_force(tmp_path, late)
     def begin(signals):
         return signals[:, int(np.argmax(signals[0])) + late :]
 
-    with pytest.raises(frf_ipz.InputError, match=r"begin at the peak of the impact or after it \(hits/hit_1.csv, "):
+    with pytest.raises(frf_ipz.InputError, match=r"begin within the impact, or after its peak, .*\(hits/hit_1.csv, "):
         estimate(tmp_path, begin, bad=range(5))
     result = estimate(tmp_path, begin)
     assert list(result.records.used) == [True, True, False, True, True]

@@ -236,9 +236,9 @@ def _least_bad(
         )
     if all(record.lacks_most for record in usable_records):
         raise InputError(
-            f"all records at {setup.input_dof} begin at the peak of the impact or after it "
-            f"({', '.join(record.name for record in usable_records[:MOST_NAMES])}"
-            f"{' ...' if len(usable_records) > MOST_NAMES else ''}), so that nothing is known of the force; record "
+            f"all records at {setup.input_dof} begin within the impact, or after its peak, and lack more of its force "
+            f"than half of what they hold ({', '.join(record.name for record in usable_records[:MOST_NAMES])}"
+            f"{' ...' if len(usable_records) > MOST_NAMES else ''}): FRFs of them would be wrong by as much; record "
             "again with a pre-trigger, which begins some milliseconds before the impact"
         )
     usable_records = [record for record in usable_records if not record.lacks_most]
