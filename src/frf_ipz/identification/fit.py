@@ -282,6 +282,16 @@ def _warnings(
             f"{late}, all by {1e3 * abs(delay):.4g} ms (+- {1e3 * std:.1g} ms), which the fit takes off: without it "
             "the modes are not normal; [fit] delay = true fits each channel's delay, delay = false none"
         )
+    if fitted.has_delayed_channels:
+        delays = {
+            str(label.output_channel or label.output_dof): delay_s
+            for label, delay_s in zip(frfs.labels, fitted.delay_s, strict=True)
+        }
+        listed = ", ".join(f"{channel} {1e3 * delay_s:+.4g} ms" for channel, delay_s in delays.items())
+        texts.append(
+            f"responses come later than the force, or before it, each by its own delay, which the fit takes off: "
+            f"{listed}; [fit] delay = false fits none"
+        )
     if fitted.drift is not None:
         texts.append(_drift_warning(frfs, fitted.drift, against_poles=fitted.poles_are_held))
     return tuple(texts)

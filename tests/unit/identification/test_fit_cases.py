@@ -238,7 +238,9 @@ def test_delays_of_channels():
     assert np.sqrt(np.mean(fit.misfit["ratio"] ** 2)) < 1.1
 
 
-@pytest.mark.parametrize("samples", [pytest.param(3.4, marks=pytest.mark.slow), 0.4, -1.7])
+@pytest.mark.parametrize(
+    "samples", [*(pytest.param(late, marks=pytest.mark.slow) for late in (3.4, -5.3, 9.0)), 0.4, -1.7]
+)
 def test_a_delay_that_all_responses_share_is_found(samples):
     truth = random_modes(SPREAD, 0.005, n_outputs=2, n_inputs=1, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, noise=1e-3, seed=SEED)
@@ -251,6 +253,17 @@ def test_a_delay_that_all_responses_share_is_found(samples):
     assert f"all by {1e3 * abs(delay_s):.3g}" in warning
     assert ("responses come later" in warning) == (samples > 0)
     assert not fit_modes(late, options=FitOptions(delay=False)).model.delay_s.any()
+
+
+@pytest.mark.slow
+def test_one_channel_that_is_late_is_named():
+    truth = random_modes(SPREAD, 0.005, n_outputs=2, n_inputs=1, seed=SEED)
+    frfs = accelerances(truth, LINES_HZ, noise=1e-3, seed=SEED)
+    delay_s = np.array([4 / 2048, 0.0])
+    fit = fit_modes(replace(frfs, values=frfs.values * np.exp(-frfs.s[:, None] * delay_s)))
+    assert_complete(fit, truth)
+    np.testing.assert_allclose(fit.model.delay_s, delay_s, rtol=0, atol=5e-7)  # 0.05 % of the shortest period
+    assert any(f"{frfs.labels[0].output_dof} +1.953 ms" in text for text in fit.warnings), fit.warnings
 
 
 def test_the_deviation_of_a_common_delay_is_true():

@@ -1,7 +1,8 @@
 """Pure delays of output channels, as filters and converters cause them.
 
 Poles held, the best delay is where residues and smooth terms explain the most of ``exp(s delay) y``. Delays and
-residues act very differently over a band of several modes, so a grid that is refined finds it.
+residues act very differently over a band of several modes, so a grid that is refined finds it. Where the best of the
+grid is at its end, it goes on beyond.
 """
 
 from __future__ import annotations
@@ -47,20 +48,32 @@ def find_delays(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms, ch
     columns = model_columns(data.s, poles, terms, real_modes=data.real_modes) * np.tile(weight, 2)[:, None]
     basis = np.linalg.qr(columns)[0]
     period = 2 * np.pi / float(np.abs(data.s[-1]))
+    longest = np.pi / float(np.min(np.diff(data.s.imag)))  # half of what the lines tell apart
     delays = np.zeros(len(channels))
     for channel in np.unique(channels):
         frfs = np.flatnonzero(channels == channel)
         rows = data.receptance[:, frfs] * weight[:, None] * data.gain[frfs]
-        delays[frfs] = _best_delay(rows, data.s, basis, period)
+        delays[frfs] = _best_delay(rows, data.s, basis, period, longest)
     return delays
 
 
-def _best_delay(rows: ComplexArray, s: ComplexArray, basis: FloatArray, period: float) -> float:
+def _best_delay(rows: ComplexArray, s: ComplexArray, basis: FloatArray, period: float, longest: float) -> float:
+    def explained(delays: FloatArray) -> FloatArray:
+        return np.array(
+            [np.sum((basis.T @ stacked(rows * np.exp(1j * s.imag[:, None] * delay))) ** 2) for delay in delays]
+        )
+
     grid = np.linspace(EARLIEST, LATEST, STEPS) * period
-    step = grid[1] - grid[0]
-    for _ in range(REFINEMENTS):
-        explained = [np.sum((basis.T @ stacked(rows * np.exp(1j * s.imag[:, None] * delay))) ** 2) for delay in grid]
-        best = float(grid[int(np.argmax(explained))])
-        grid = best + step * np.linspace(-1, 1, 11)
+    step = float(grid[1] - grid[0])
+    values = explained(grid)
+    while (best := int(np.argmax(values))) in {0, len(grid) - 1} and abs(grid[best]) < longest:
+        beyond = grid[best] + (step if best else -step) * np.arange(1, STEPS)
+        grid, values = np.append(grid, beyond), np.append(values, explained(beyond))
+        order = np.argsort(grid)
+        grid, values = grid[order], values[order]
+    delay = float(grid[best])
+    for _ in range(REFINEMENTS - 1):
+        grid = delay + step * np.linspace(-1, 1, 11)
+        delay = float(grid[int(np.argmax(explained(grid)))])
         step *= 2 * FINER
-    return best
+    return delay

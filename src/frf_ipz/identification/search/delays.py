@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import stats
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.identification.likelihood.compression import column_gains, compress
 from frf_ipz.identification.likelihood.delay import find_delays
 from frf_ipz.identification.measured_lines import MeasuredLines, WeightedLines
@@ -70,13 +70,44 @@ def each_delay(
     (n_frfs,) array
         s.
     """
-    channels = [label.output_channel or label.output_dof.name for label in labels]
-    numbers = np.asarray(np.unique(channels, return_inverse=True)[1], np.int64)
+    numbers = _channel_numbers(labels)
     delays = np.zeros(len(labels))
     for _ in range(ROUNDS):
         poles = find_poles(lines.advanced(delays))
         delays = find_delays(_normal(lines), poles, terms, numbers)
     return delays
+
+
+def explains_misfit(labels: Sequence[FrfLabel], lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms) -> bool:
+    """Tell whether delays of single channels explain most of what a fit leaves.
+
+    Parameters
+    ----------
+    labels : sequence of FrfLabel
+        Of the FRFs.
+    lines : MeasuredLines
+        Lines, weighted by the noise.
+    poles : (n_poles,) complex array
+        Of the fit, rad/s.
+    terms : SmoothTerms
+        Terms for modes out of band.
+
+    Returns
+    -------
+    bool
+        True where even complex modes, which follow a short delay, are much closer to the lines with the delays.
+    """
+    numbers = _channel_numbers(labels)
+    if not numbers.any():
+        return False
+    delays = find_delays(_normal(lines), poles, terms, numbers)
+    data, late = (replace(_normal(at), real_modes=False) for at in (lines, lines.advanced(delays)))
+    return _misfit(late, poles, terms) < MOST * _misfit(data, poles, terms)
+
+
+def _channel_numbers(labels: Sequence[FrfLabel]) -> IntArray:
+    channels = [label.output_channel or label.output_dof.name for label in labels]
+    return np.asarray(np.unique(channels, return_inverse=True)[1], np.int64)
 
 
 def common_delay(
@@ -121,14 +152,38 @@ def common_delay(
     late = _normal(lines.advanced(np.full(n_frfs, delay)))
     if len(poles) < FEWEST_MODES or not _turns_most_modes(normal, late, poles, terms):
         return None
+    return measure_delay(lines, poles, terms, delay)
+
+
+def measure_delay(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms, delay_s: float) -> CommonDelay:
+    """Give a delay that all FRFs share its standard deviation.
+
+    Parameters
+    ----------
+    lines : MeasuredLines
+        Lines, weighted by the noise, as they were measured.
+    poles : (n_poles,) complex array
+        Of a fit without the delay, rad/s.
+    terms : SmoothTerms
+        Terms for modes out of band.
+    delay_s : float
+        The delay, s.
+
+    Returns
+    -------
+    CommonDelay
+        By the curvature of the misfit, or by the scatter over FRFs where that is more.
+    """
+    n_frfs = lines.receptance.shape[1]
     step = STEP * 2 * np.pi / float(np.abs(lines.s[-1]))
     before, at, after = (
-        _misfit(_normal(lines.advanced(np.full(n_frfs, delay + change))), poles, terms) for change in (-step, 0.0, step)
+        _misfit(_normal(lines.advanced(np.full(n_frfs, delay_s + change))), poles, terms)
+        for change in (-step, 0.0, step)
     )
     curvature = max((before - 2 * at + after) / step**2, np.finfo(float).tiny)
-    by_noise = float(np.sqrt(2 / curvature * max(1.0, at / noise)))
-    each = find_delays(normal, poles, terms, np.arange(n_frfs))
-    return CommonDelay(delay_s=delay, std_s=max(by_noise, _std_of_median(each)))
+    by_noise = float(np.sqrt(2 / curvature * max(1.0, at / (2.0 * lines.receptance.size))))
+    each = find_delays(_normal(lines.advanced(np.full(n_frfs, delay_s))), poles, terms, np.arange(n_frfs))
+    return CommonDelay(delay_s=delay_s, std_s=max(by_noise, _std_of_median(each)))
 
 
 def _std_of_median(values: FloatArray) -> float:

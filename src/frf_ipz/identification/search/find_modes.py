@@ -20,7 +20,8 @@ from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_po
 from frf_ipz.identification.likelihood.sandwich import pole_variance_factors
 from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms, smooth_terms_of_band
 from frf_ipz.identification.measured_lines import MeasuredLines, measured_lines, with_misfit_noise
-from frf_ipz.identification.search.delays import CommonDelay, common_delay, each_delay
+from frf_ipz.identification.search.arrivals import find_arrival
+from frf_ipz.identification.search.delays import CommonDelay, common_delay, each_delay, explains_misfit, measure_delay
 from frf_ipz.identification.search.drift import Drift
 from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, assess_fit, peak_levels
 from frf_ipz.identification.search.selection import ROUGH_ITERATIONS, SelectedModes, select_modes
@@ -35,6 +36,8 @@ FIXED_POLES = 3  # beside the band, while modes are searched
 NOISE_ROUNDS = 3  # of fitting the start poles and estimating the noise in turn
 FAR_LOWER = 0.25  # of a variance: the estimates themselves scatter by less
 LEAST_SPARE = 0.25  # of the numbers that an FRF has must be left to tell the noise of a model
+FAR_OFF = 1.0  # periods of the highest frequency: to within it an arrival is known
+LATE_MISFIT = 0.5  # times the misfit that is left with the delay: it explains most of its square
 MODEL_ERROR = 1.3  # misfit over noise above which the model, not the noise, limits the fit
 
 
@@ -68,6 +71,8 @@ class FittedModes:
         Delays that were taken off.
     common_delay : CommonDelay or None
         The delay that all FRFs share, where there is one and the user asked for no other.
+    has_delayed_channels : bool
+        Each channel has a delay of its own, though the user did not ask for that.
     poles_are_held : bool
         Poles are given and were not fitted.
     """
@@ -84,6 +89,7 @@ class FittedModes:
     decisions: tuple[dict[str, object], ...]
     delay_s: FloatArray
     common_delay: CommonDelay | None = None
+    has_delayed_channels: bool = False
     poles_are_held: bool = False
 
 
@@ -113,6 +119,65 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
     """
     progress(0.0, "choosing lines")
     lines = measured_lines(frfs, options)
+    try:
+        fitted = _find_modes(frfs, lines, options, progress)
+    except NoModesError:
+        if options.delay is not None:
+            raise
+        late = _fit_late_responses(frfs, lines, None, options)
+        if late is None:
+            raise
+        return late
+    if options.delay is None and np.median(fitted.misfit_ratio) > MODEL_ERROR:
+        progress(0.6, "looking for responses that are far too late")
+        fitted = _fit_late_responses(frfs, lines, fitted, options) or fitted
+    if options.delay is None and np.median(fitted.misfit_ratio) > MODEL_ERROR:
+        return _fit_delayed_channels(frfs, fitted, options) or fitted
+    return fitted
+
+
+def _fit_late_responses(
+    frfs: FrfSet, lines: MeasuredLines, fitted: FittedModes | None, options: FitOptions
+) -> FittedModes | None:
+    """Fit without a delay of periods, where the responses begin so much off the force; None where that is no better."""
+    arrival_s = find_arrival(lines)
+    known_s = 0.0 if fitted is None or fitted.common_delay is None else fitted.common_delay.delay_s
+    if abs(arrival_s - known_s) * lines.band_hz[1] < FAR_OFF:
+        return None
+    advanced = replace(frfs, values=frfs.values * np.exp(frfs.s[:, None] * arrival_s))
+    try:
+        late = _find_modes(advanced, measured_lines(advanced, options), options, silent)
+    except NoModesError:
+        return None
+    if fitted is not None and np.median(late.misfit_ratio) > LATE_MISFIT * np.median(fitted.misfit_ratio):
+        return None
+    delay_s = arrival_s + float(late.delay_s[0])
+    weighed = replace(late.lines, variance=late.noise).advanced(np.full(frfs.n_frfs, -delay_s))
+    delay = measure_delay(weighed, late.fit.poles, late.terms, delay_s)
+    return replace(late, delay_s=np.full(frfs.n_frfs, delay_s), common_delay=delay)
+
+
+def _fit_delayed_channels(frfs: FrfSet, fitted: FittedModes, options: FitOptions) -> FittedModes | None:
+    """Fit each channel's own delay, where that takes off most of the misfit; else None."""
+    lines = replace(fitted.lines, variance=fitted.noise)
+    if not explains_misfit(frfs.labels, lines, fitted.fit.poles, fitted.terms):
+        return None
+    own = replace(options, delay=True)
+    delayed = _find_modes(frfs, measured_lines(frfs, own), own, silent)
+    if np.median(delayed.misfit_ratio) > LATE_MISFIT * np.median(fitted.misfit_ratio):
+        return None
+    return replace(delayed, has_delayed_channels=True)
+
+
+def _fit_advanced(frfs: FrfSet, delay: CommonDelay, options: FitOptions) -> FittedModes:
+    """Fit without a delay, from the first poles on: those of late responses describe the delay as well."""
+    advanced = replace(frfs, values=frfs.values * np.exp(frfs.s[:, None] * delay.delay_s))
+    without = replace(options, delay=False)
+    fitted = _find_modes(advanced, measured_lines(advanced, without), without, silent)
+    return replace(fitted, delay_s=np.full(frfs.n_frfs, delay.delay_s), common_delay=delay)
+
+
+def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progress: Progress) -> FittedModes:
     progress(0.05, "looking for first poles")
     start = find_start_poles(frfs, lines, max_order=options.max_order, stability=options.stability)
     terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(FIXED_POLES)
@@ -139,8 +204,7 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
         weighed = replace(fitted.lines, receptance=lines.receptance, variance=fitted.noise)
         delay = common_delay(weighed, fitted.fit.poles, terms, find_poles)
         if delay is not None:
-            delay_s = np.full(frfs.n_frfs, delay.delay_s)
-            fitted = replace(fit_lines(lines.advanced(delay_s), delay_s), common_delay=delay)
+            return _fit_advanced(frfs, delay, options)
     if np.median(fitted.misfit_ratio) > MODEL_ERROR:
         progress(0.55, "adding and dropping poles by the model error")
         fitted = _against_model_error(fitted, options)
