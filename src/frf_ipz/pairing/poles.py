@@ -20,6 +20,7 @@ from frf_ipz.pairing.matching import Hypothesis, Matching, match, mixed_probabil
 from frf_ipz.pairing.model_roots import ModelPoles
 
 if TYPE_CHECKING:
+    from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.modal_fit import ModalFit
 
 FREQUENCY_STD = 0.05  # of the logarithm of a frequency, after the common factor
@@ -80,8 +81,8 @@ def pair_poles(fit: ModalFit, model: ModelPoles) -> PolePairing:
     shapes = _direction_costs(amplitudes, model.amplitudes)  # gains are not known yet, and of a stated shape never
     for _ in range(ROUNDS if fit.labels else 0):
         best, *_ = _tried(measured, computed, shapes, band)
-        gains = _gains(amplitudes, model.amplitudes, noise, best.matching.partner)
-        shapes = _shape_costs(amplitudes, model.amplitudes, noise, gains)
+        gains = _gains(amplitudes, model.amplitudes, noise, best.matching.partner, fit.labels)
+        shapes = _shape_costs(amplitudes, model.amplitudes, noise, gains, fit.labels)
     tried = _tried(measured, computed, shapes, band)
     return PolePairing(
         matching=tried[0].matching,
@@ -148,6 +149,25 @@ def _likely_factors(gaps: FloatArray, shapes: FloatArray, scatter: float) -> lis
     return chosen
 
 
+def _sizes(amplitudes: ComplexArray, labels: tuple[FrfLabel, ...]) -> FloatArray:
+    """Root of mean square of the amplitudes that an FRF would have if its sensor and its excitation shared all modes.
+
+    Ports of two axes of a symmetric structure hardly do: the amplitudes between them are small, not so their change
+    with a shape, which is a part of what the sensor sees of other modes. Where one row or column of FRFs was measured
+    it is what the FRF has.
+    """
+    power = np.abs(amplitudes) ** 2
+    total = np.maximum(power.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+    parts = []
+    for dofs in ([label.output_dof.unsigned for label in labels], [label.input_dof.unsigned for label in labels]):
+        numbers = np.unique([str(dof) for dof in dofs], return_inverse=True)[1]
+        summed = power @ (numbers[:, None] == np.arange(numbers.max(initial=0) + 1))
+        parts.append((np.mean(summed, axis=0)[numbers], np.mean(summed / total, axis=0)[numbers]))
+    (of_output, output_share), (of_input, input_share) = parts
+    shared = np.minimum(of_output * input_share, of_input * output_share)
+    return np.asarray(np.sqrt(np.maximum(np.mean(power, axis=0), shared)))
+
+
 def _direction_costs(measured: ComplexArray, computed: ComplexArray) -> FloatArray:
     """Squared distance of shapes whose scale is not known: what the best factor leaves of each, as MAC has it."""
     left_over = 1 - modal_assurance(measured.T, computed.T)
@@ -160,28 +180,41 @@ def _bounded(costs: FloatArray) -> FloatArray:
     return np.asarray(np.where(costs < half, costs, MAX_SHAPE - half**2 / np.maximum(costs, half)))
 
 
-def _gains(measured: ComplexArray, computed: ComplexArray, noise: FloatArray, partner: IntArray) -> FloatArray:
+def _gains(
+    measured: ComplexArray,
+    computed: ComplexArray,
+    noise: FloatArray,
+    partner: IntArray,
+    labels: tuple[FrfLabel, ...],
+) -> FloatArray:
     """Least-squares gain of each FRF over the modes paired so far; only its sign where its size is not clear."""
     rows = np.flatnonzero(partner >= 0)
     if not len(rows):
         return np.ones(measured.shape[1])
     partners = computed[partner[rows]]
-    weights = 1 / (noise[rows] ** 2 + np.mean(np.abs(measured[rows]) ** 2, axis=0) * AMPLITUDE_STD**2)
+    weights = 1 / (noise[rows] ** 2 + (AMPLITUDE_STD * _sizes(measured[rows], labels)) ** 2)
     inner = np.sum(weights * (measured[rows] * partners.conj()).real, axis=0)
     sizes = np.sum(weights * np.abs(partners) ** 2, axis=0)
     ratio = np.sqrt(np.mean(np.abs(measured[rows]) ** 2, 0) / np.maximum(np.mean(np.abs(partners) ** 2, 0), 1e-300))
     gain = inner / np.maximum(sizes, 1e-300)
-    return np.asarray(np.where(np.abs(gain) > ratio / 3, gain, np.copysign(ratio, gain)))
+    polarity = np.where(inner**2 < UNMATCHED * sizes, 1.0, gain)  # a sign that shapes leave open is the model's
+    return np.asarray(np.where(np.abs(gain) > ratio / 3, np.copysign(gain, polarity), np.copysign(ratio, polarity)))
 
 
-def _shape_costs(measured: ComplexArray, computed: ComplexArray, noise: FloatArray, gains: FloatArray) -> FloatArray:
+def _shape_costs(
+    measured: ComplexArray,
+    computed: ComplexArray,
+    noise: FloatArray,
+    gains: FloatArray,
+    labels: tuple[FrfLabel, ...],
+) -> FloatArray:
     """Squared distance of amplitudes: of their directions, which MAC compares, and of their sizes.
 
     Errors of a direction are shared by many FRFs, so their number counts with its root. The size is one number, however
     many FRFs show it: a modal mass that is off must not hide that a direction agrees.
     """
     scaled = measured / gains
-    size = np.sqrt(np.mean(np.abs(scaled) ** 2, axis=0))
+    size = _sizes(scaled, labels)
     weight = 1 / ((AMPLITUDE_STD * size) ** 2 + (noise / gains) ** 2)
     of_measured = np.sum(weight * np.abs(scaled) ** 2, axis=1)[:, None]
     of_computed = weight @ (np.abs(computed) ** 2).T

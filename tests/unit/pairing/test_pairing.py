@@ -277,10 +277,16 @@ def many_frfs(n_frfs, seed, *, frequencies, measured_frequencies, order, sizes, 
     rng = np.random.default_rng(seed)
     labels = tuple(label(place + 1, 1) for place in range(n_frfs))
     amplitudes = rng.standard_normal((len(frequencies), n_frfs))
+    seen = (amplitudes[order] + error * rng.standard_normal((len(order), n_frfs))) * np.array(sizes)[:, None]
+    return pairing_of(labels, frequencies, measured_frequencies, amplitudes, seen)
+
+
+def pairing_of(labels, frequencies, measured_frequencies, amplitudes, seen):
+    """Pair modes of given amplitudes in all FRFs, the model's and those that are seen."""
+    n_frfs = len(labels)
     values = 2 * np.pi * np.array(frequencies) * (1j - 0.005)
     model = ModelPoles(values=values, amplitudes=amplitudes.astype(complex))
     poles = 2 * np.pi * np.array(measured_frequencies) * (1j - 0.005)
-    seen = (amplitudes[order] + error * rng.standard_normal((len(order), n_frfs))) * np.array(sizes)[:, None]
     powers = np.array([frf_label.quantity.power for frf_label in labels])
     fitted = PoleResidueModel(
         poles=poles,
@@ -321,7 +327,8 @@ def test_close_modes_of_mixed_shapes_are_told_apart_by_mac(n_frfs):
     rng = np.random.default_rng(n_frfs)
     shapes = rng.standard_normal((3, n_frfs))
     mixed = np.array([0.9 * shapes[0] + 0.3 * shapes[1], 0.9 * shapes[1] - 0.3 * shapes[0]])
-    costs = _shape_costs(mixed.astype(complex), shapes.astype(complex), np.zeros((2, n_frfs)), np.ones(n_frfs))
+    labels = tuple(label(place + 1, 1) for place in range(n_frfs))
+    costs = _shape_costs(mixed.astype(complex), shapes.astype(complex), np.zeros((2, n_frfs)), np.ones(n_frfs), labels)
     assert costs[0].argmin() == 0
     assert costs[1].argmin() == 1
 
@@ -335,8 +342,37 @@ def test_every_step_of_mac_counts(n_frfs):
     other *= np.linalg.norm(first) / np.linalg.norm(other)
     assurances = np.array([0.0, 0.5, 0.9, 0.97, 1.0])
     measured_shapes = np.sqrt(assurances)[:, None] * first + np.sqrt(1 - assurances)[:, None] * other
+    labels = tuple(label(place + 1, 1) for place in range(n_frfs))
     costs = _shape_costs(
-        1.6 * measured_shapes.astype(complex), first[None].astype(complex), np.zeros((5, n_frfs)), np.ones(n_frfs)
+        1.6 * measured_shapes.astype(complex),
+        first[None].astype(complex),
+        np.zeros((5, n_frfs)),
+        np.ones(n_frfs),
+        labels,
     )[:, 0]
     assert (np.diff(costs) < 0).all()
     assert costs[0] - costs[3] > 4.0  # odds of e^2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_frfs_that_vanish_by_symmetry_say_nothing(seed):
+    """Ports of two axes: each mode moves one of them, and what is left of the other is an accident of both models."""
+    rng = np.random.default_rng(seed)
+    frequencies = [100.0, 103.0, 140.0, 143.0, 205.0, 208.0]
+    labels = tuple(label(output + 1, excited + 1) for output in range(6) for excited in range(6))
+    axis = np.arange(6) // 3
+    moves = np.where(axis == np.arange(6)[:, None] % 2, 1.0, 1e-3)
+    sensors, forces = rng.standard_normal((2, 6, 6))
+
+    def amplitudes():
+        """Shapes 20 % off along their axis, and new ones across it."""
+        accident = np.where(moves < 1, rng.standard_normal((2, 6, 6)) / np.stack([sensors, forces]), 1.0)
+        wrong = 1 + 0.2 * rng.standard_normal((2, 6, 6))
+        outputs, inputs = np.stack([sensors, forces]) * moves * accident * wrong
+        return np.einsum("mo,mi->moi", outputs, inputs).reshape(6, 36)
+
+    swapped = [102.6, 100.4, 143.2, 140.6, 207.4, 205.6]  # two modes of different axes have changed places
+    pairing = pairing_of(labels, frequencies, swapped, amplitudes(), amplitudes())
+    assert pairing.matching.partner.tolist() == list(range(6))
+    assert (pairing.probabilities[range(6), range(6)] > SURE).all()
+    assert (pairing.gains > 0).all()
