@@ -176,10 +176,10 @@ def _rigid_states(model: StateSpaceModel) -> list[int]:
     states = [place for place, name in enumerate(names) if name.startswith(RIGID) and name.endswith("displacement")]
     if not states:
         raise InputError("the state space has no rigid-body mode; a structure that is held has nothing to decouple")
-    if any("delay of input" in name or "samples before" in name for name in names):
+    if any(name.startswith("delay of ") or name.endswith("samples before") for name in names):
         raise InputError(
-            "the state space has a delay at its inputs; find the decoupling without [export] delay_s, and apply it to "
-            "the state space with it"
+            "the state space has a delay at its inputs or outputs; find the decoupling without [export] delay_s (and "
+            "with rebuild_state_space where channels are late), and apply it to the state space with it"
         )
     return states
 

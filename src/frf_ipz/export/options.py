@@ -29,7 +29,8 @@ class ExportOptions:
     residual : str
         Residual flexibility as ``dynamics`` (proper) or as ``feedthrough``.
     pade_order : int
-        Order of the Pade approximant of known delays; 0 omits those of channels.
+        Order of the Pade approximant of delays in continuous models; 0 omits those of channels. Sampled models need
+        none: their delays are exact.
     delay_s : float
         Delay of the loop, at the inputs, s: exact where `sample_time_s` is given, else by a Pade approximant of
         `pade_order`.

@@ -1,4 +1,4 @@
-"""State spaces of second-order models, as bare matrices: modes as states, delays in series, sampling.
+"""State spaces of second-order models, as bare matrices: modes as states, delays in series.
 
 The states are each mode's displacement times a rate w and its velocity, in mass-normalised coordinates: with
 ``w = omega`` a mode is a rotation, ``[[0, omega], [-omega, -2 zeta omega]]``, and the matrices are of one size, which
@@ -11,11 +11,11 @@ rounding would turn a double integrator into a stable and an unstable pole: ``[[
 
 from __future__ import annotations
 
-from math import ceil, factorial
+from math import factorial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag, expm
+from scipy.linalg import block_diag
 
 from frf_ipz.arrays import BoolArray, FloatArray
 from frf_ipz.errors import InputError
@@ -32,7 +32,6 @@ ROUNDING = (
     1e3 * EPS
 )  # of the sum of all terms' sizes: a reduced model's matrices hold the condition number of its modes
 LOWEST_RATE = 1e-6  # of the highest natural frequency: lower bound of the rate by which a mode is scaled
-WHOLE_SAMPLES = 1e-9  # of a sample: a delay written in decimal digits is whole samples to within rounding
 UNSEEN = 1e-9  # of the largest share of a mode in a port: no resonance lifts what is below to where it matters
 
 
@@ -350,48 +349,6 @@ def with_input_delay(system: Matrices, delay_s: float, order: int) -> Matrices:
     )
 
 
-def discretise_with_input_delay(system: Matrices, sample_time_s: float, delay_s: float) -> Matrices:
-    """Discretise for inputs that are held between samples and act late: exact for any delay.
-
-    Within a sample the inputs of two samples act one after the other ([FranklinPowellWorkman1998], section 4.3.4).
-
-    [FranklinPowellWorkman1998] G. F. Franklin, J. D. Powell, M. Workman, Digital control of dynamic systems, third
-    edition, Addison-Wesley, 1998.
-
-    Parameters
-    ----------
-    system : Matrices
-        Continuous.
-    sample_time_s, delay_s : float
-        Positive.
-
-    Returns
-    -------
-    Matrices
-        Discrete; the inputs of the samples before are states at the end, the last one first.
-    """
-    count = max(ceil(delay_s / sample_time_s - WHOLE_SAMPLES), 1)  # samples whose inputs are still to act
-    late = delay_s - (count - 1) * sample_time_s
-    is_whole = sample_time_s - late <= WHOLE_SAMPLES * sample_time_s
-    whole = discretise(system, sample_time_s)
-    fresh = np.zeros_like(whole.B) if is_whole else discretise(system, sample_time_s - late).B
-    n_states, n_inputs = whole.B.shape
-    registers = [np.zeros((n_states, n_inputs)) for _ in range(count)]
-    registers[-1] = whole.B if is_whole else whole.B - fresh
-    driven = fresh
-    if count > 1:
-        registers[-2], driven = fresh, np.zeros_like(fresh)
-    shift = np.kron(np.eye(count, k=-1), np.eye(n_inputs))
-    first = np.kron(np.eye(count)[:, :1], np.eye(n_inputs))
-    through = np.hstack([np.zeros((len(whole.D), (count - 1) * n_inputs)), whole.D])
-    return Matrices(
-        np.block([[whole.A, np.hstack(registers)], [np.zeros((count * n_inputs, n_states)), shift]]),
-        np.vstack([driven, first]),
-        np.hstack([whole.C, through]),
-        np.zeros_like(whole.D),
-    )
-
-
 def pade_delay(delay_s: float, order: int) -> Matrices:
     """Realise the diagonal Pade approximant of a delay.
 
@@ -460,41 +417,3 @@ def with_delays(system: Matrices, delays_s: Sequence[float], order: int) -> Matr
         outputs,
         feedthrough,
     )
-
-
-def discretise(system: Matrices, sample_time_s: float) -> Matrices:
-    """Discretise for inputs that are held between samples.
-
-    Parameters
-    ----------
-    system : Matrices
-        Continuous.
-    sample_time_s : float
-        Positive.
-
-    Returns
-    -------
-    Matrices
-        Discrete.
-    """
-    states, inputs = system.B.shape
-    augmented = np.zeros((states + inputs, states + inputs))
-    augmented[:states] = np.hstack([system.A, system.B]) * sample_time_s
-    transition = expm(augmented)
-    for place in _double_integrators(system.A):  # to the last bit: a pole of 1 + 1e-16 is an unstable one
-        rate = system.A[place, place + 1] * sample_time_s
-        force = system.B[place + 1] * sample_time_s
-        transition[place : place + 2] = 0.0
-        transition[place, place : place + 2] = 1.0, rate
-        transition[place + 1, place + 1] = 1.0
-        transition[place : place + 2, states:] = rate * force / 2, force
-    return Matrices(transition[:states, :states], transition[:states, states:], system.C, system.D)
-
-
-def _double_integrators(A: FloatArray) -> list[int]:
-    """Places of displacements whose rate is their velocity's, which nothing but inputs changes."""
-    return [
-        place
-        for place in range(len(A) - 1)
-        if not A[place + 1].any() and A[place, place + 1] and np.count_nonzero(A[place]) == 1
-    ]

@@ -24,8 +24,6 @@ from frf_ipz.export.realization import (
     Selection,
     balance_modes,
     condense_high_modes,
-    discretise,
-    discretise_with_input_delay,
     modal_form,
     select_states,
     take_states,
@@ -33,6 +31,7 @@ from frf_ipz.export.realization import (
     with_delays,
     with_input_delay,
 )
+from frf_ipz.export.sampling import discretise_with_delays
 from frf_ipz.frf import require_measured
 from frf_ipz.updating.scale import MeasuredScale
 from frf_ipz.updating.updated_model import UpdatedModel
@@ -424,11 +423,8 @@ def _to_state_space(
     modes = [f"rigid-body mode {number + 1}" for number in range(selection.seen)]
     modes += [f"mode {system.n_rigid + place + 1}" for place in np.flatnonzero(selection.elastic)]
     names = [f"{mode} {quantity}" for mode in modes for quantity in ("displacement", "velocity")]
-    delayed = [output for output in outputs if output.delay_s > 0 and options.pade_order]
-    names += [f"delay of {output.name} {order + 1}" for output in delayed for order in range(options.pade_order)]
-    matrices = with_delays(matrices, [output.delay_s for output in outputs], options.pade_order)
-    A, B, C, D = _with_loop_delay(matrices, options)
-    names += _names_of_loop_delay(len(A) - len(names), ports, options)
+    (A, B, C, D), delay_names = _with_delays(matrices, ports, options)
+    names += delay_names
     return StateSpaceModel(
         A=A,
         B=B,
@@ -444,20 +440,25 @@ def _to_state_space(
     )
 
 
-def _with_loop_delay(system: Matrices, options: ExportOptions) -> Matrices:
-    delay_s, sample_time_s = options.delay_s, options.sample_time_s
-    if sample_time_s > 0:
-        delayed = discretise_with_input_delay(system, sample_time_s, delay_s) if delay_s > 0 else None
-        return delayed or discretise(system, sample_time_s)
-    return with_input_delay(system, delay_s, options.pade_order) if delay_s > 0 else system
-
-
-def _names_of_loop_delay(count: int, ports: Ports, options: ExportOptions) -> list[str]:
+def _with_delays(system: Matrices, ports: Ports, options: ExportOptions) -> tuple[Matrices, list[str]]:
+    """Add the delays of outputs and of the loop, exactly where the model is sampled, and name the states they take."""
     inputs = [str(dof) for dof in ports.inputs]
-    each = count // len(inputs)
+    delays_s = [output.delay_s for output in ports.outputs]
     if options.sample_time_s > 0:
-        return [f"input {name}, {sample + 1} samples before" for sample in range(each) for name in inputs]
-    return [f"delay of input {name} {order + 1}" for name in inputs for order in range(each)]
+        sampled, n_before = discretise_with_delays(system, options.sample_time_s, options.delay_s, delays_s)
+        n_waiting = (len(sampled.A) - len(system.A) - int(n_before.sum())) // len(inputs)
+        names = [f"input {name}, {number + 1} samples before" for number in range(n_waiting) for name in inputs]
+        late = zip(ports.outputs, n_before.tolist(), strict=True)
+        return sampled, names + [
+            f"output {output.name}, {number + 1} samples before" for output, count in late for number in range(count)
+        ]
+    orders = range(1, options.pade_order + 1)
+    names = [f"delay of {output.name} {order}" for output in ports.outputs if output.delay_s > 0 for order in orders]
+    system = with_delays(system, delays_s, options.pade_order)
+    if options.delay_s > 0:
+        system = with_input_delay(system, options.delay_s, options.pade_order)
+        names += [f"delay of input {name} {order}" for name in inputs for order in orders]
+    return system, names
 
 
 def _notes(system: SecondOrder, selection: Selection) -> tuple[str, ...]:

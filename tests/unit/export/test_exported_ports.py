@@ -10,8 +10,9 @@ import frf_ipz
 from chains import updated
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.export.options import ExportOptions
-from frf_ipz.export.realization import Matrices, discretise_with_input_delay
+from frf_ipz.export.realization import Matrices
 from frf_ipz.export.reduced_model_file import read_updated_model, write_reduced_model
+from frf_ipz.export.sampling import discretise_with_delays
 from frf_ipz.export.state_space import make_state_space, to_control
 from frf_ipz.fe.reduction.reduce import reduce_to_dofs
 from frf_ipz.frf import FrfLabel
@@ -83,32 +84,33 @@ def test_the_states_of_a_mode_are_driven_as_much_as_their_velocity_is_seen(reduc
     assert_allclose(-np.diag(elastic, -1)[::2], rates, rtol=1e-9)  # a rotation each: entries of one size
 
 
-@pytest.mark.parametrize("delay", [1.0, 3.0, 0.4, 2.7])
-def test_a_delay_is_exact_where_the_model_is_sampled(delay):
-    """Against the response to a held input that steps late, integrated over the pieces of each sample."""
+def held_response(system, inputs, delay, time):
+    """Outputs at a time in samples of 1 ms, to inputs that are held and act late, integrated piece by piece."""
+    augmented = np.block([[system.A, system.B], [np.zeros((1, len(system.A) + 1))]])
+    states, place = np.zeros(len(system.A)), 0.0
+    while place < time - 1e-9:
+        index = int(np.floor(place - delay + 1e-9))
+        until = min(time, index + 1 + delay)
+        piece = expm(augmented * (until - place) * 1e-3)
+        states = piece[:-1, :-1] @ states + piece[:-1, -1] * (inputs[index] if index >= 0 else 0.0)
+        place = until
+    arrived = int(np.floor(time - delay + 1e-9))
+    return system.C @ states + system.D[:, 0] * (inputs[arrived] if arrived >= 0 else 0.0)
+
+
+@pytest.mark.parametrize("late", [(0.0, 0.0), (2.0, 0.7), (1.3, 0.0)])
+@pytest.mark.parametrize("delay", [0.0, 1.0, 3.0, 0.4, 2.7])
+def test_delays_are_exact_where_the_model_is_sampled(delay, late):
     A = np.array([[0.0, 700.0, 0.0, 0.0], [-700.0, -14.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0]])
     system = Matrices(A, np.array([[0.0], [2.0], [0.0], [1.0]]), np.eye(4)[::2], np.array([[0.0], [0.3]]))
-    sampled = discretise_with_input_delay(system, 1e-3, delay * 1e-3)
-    inputs = np.random.default_rng(4).normal(size=12)
-    augmented = np.block([[A, system.B], [np.zeros((1, 5))]])
-    states, late, place = np.zeros(4), np.zeros(len(sampled.A)), 0.0
-    for sample in range(12):
-        arrived = int(np.floor(sample - delay + 1e-9))
-        value = inputs[arrived] if arrived >= 0 else 0.0
-        assert_allclose(
-            sampled.C @ late + sampled.D[:, 0] * inputs[sample],
-            system.C @ states + system.D[:, 0] * value,
-            rtol=0,
-            atol=1e-9,
-        )
-        late = sampled.A @ late + sampled.B[:, 0] * inputs[sample]
-        place = float(sample)
-        while place < sample + 1 - 1e-9:  # one piece for each value that acts within the sample
-            index = int(np.floor(place - delay + 1e-9))
-            until = min(sample + 1.0, index + 1 + delay)
-            piece = expm(augmented * (until - place) * 1e-3)
-            states = piece[:4, :4] @ states + piece[:4, 4] * (inputs[index] if index >= 0 else 0.0)
-            place = until
+    sampled, n_before = discretise_with_delays(system, 1e-3, delay * 1e-3, [1e-3 * value for value in late])
+    assert n_before.tolist() == [int(np.ceil(value)) for value in late]
+    inputs = np.random.default_rng(4).normal(size=8)
+    states = np.zeros(len(sampled.A))
+    for sample in range(8):
+        expected = [held_response(system, inputs, delay, sample - value)[row] for row, value in enumerate(late)]
+        assert_allclose(sampled.C @ states + sampled.D[:, 0] * inputs[sample], expected, rtol=0, atol=1e-9)
+        states = sampled.A @ states + sampled.B[:, 0] * inputs[sample]
 
 
 @pytest.mark.parametrize("delay_s", [2e-4, 2.5e-4])

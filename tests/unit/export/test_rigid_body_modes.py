@@ -136,7 +136,7 @@ def test_a_delay_leaves_it_exact():
     for sample_time_s in (0.0, 1e-4):
         options = ExportOptions(pade_order=2, sample_time_s=sample_time_s)
         space = make_state_space(labels, updated(reduced), options=options, delays_s={"x": 3e-4})
-        assert space.state_names[-1] == "delay of 1:+x 2"
+        assert space.state_names[-1] == ("output 1:+x, 3 samples before" if sample_time_s else "delay of 1:+x 2")
         pole = 1.0 if sample_time_s else 0.0
         assert np.count_nonzero(np.linalg.eigvals(space.A) == pole) == 2
 
