@@ -2,7 +2,7 @@
 
 ``K phi = omega^2 M phi`` is solved by shift and inversion, ``(K + tau M)^-1 M``, with tau near the square of 0.4 times
 the first elastic mode: the low modes then keep their digits however fine the mesh, and a free structure stays positive
-definite. Small models take LAPACK, large ones ARPACK on a sparse factor.
+definite. Small models take LAPACK, large ones block Lanczos on a sparse factor.
 
 Whether a structure is free is asked of the geometry first: the motions of a rigid body that strain no row of the
 stiffness beyond its rounding are modes of frequency 0, and the elastic modes are sought beside them. Few printed digits
@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse import linalg as sparse_linalg
 
 from frf_ipz.arguments import require_type
 from frf_ipz.arrays import FloatArray, IntArray
@@ -25,7 +24,8 @@ from frf_ipz.errors import ConvergenceError, IllConditionedError, InputError, er
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.global_motions import bending_motions, rigid_body_motions
 from frf_ipz.modes import ModeSet
-from frf_ipz.numerics.factorization import DENSE_ORDER, Factorization, factorize, is_positive_definite
+from frf_ipz.numerics.block_lanczos import largest_pairs
+from frf_ipz.numerics.factorization import DENSE_ORDER, Factorization, factorize
 from frf_ipz.numerics.rounding import printed_decimals
 from frf_ipz.structure import Geometry, StructuralModel
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 EPS = float(np.finfo(float).eps)
 SHIFT = 0.4  # of the first elastic frequency: the low modes come out to rounding
 HELD_SHIFT = 0.01  # of the estimate, for a structure that is held: its stiffness needs no shift to be factored
-USEFUL_SHIFTS = (1e-3, 4.0)  # of the first elastic frequency: below, digits are lost; above, ARPACK crawls
+USEFUL_SHIFTS = (1e-3, 4.0)  # of the first elastic frequency: below, digits are lost; above, Lanczos crawls
 LOST = 1e-6  # of the shift: squares of frequencies below have no digit
 NO_ENERGY = 16.0  # roundings of the sum of all terms' sizes: strain energy below is indistinguishable from zero
 MAX_ROUNDING = 1e-9  # of a stiffness matrix that a condensation has rounded
@@ -46,7 +46,6 @@ SPREAD = 4.0  # half units of the last digit of all terms, added in squares: no 
 FREE_ROWS = 0.9  # of the rows lie away from supports, so that a translation strains nothing there
 DEPENDENT = 1e-10  # of the largest weight: a combination of motions below is linearly dependent
 MANY_MODES = 4  # a larger share of all modes than one in so many is found faster by LAPACK
-FIRST_MODES = 24  # ARPACK's first guess at how many modes lie below a frequency
 FLEXIBILITY_STEPS = 60
 FLEXIBILITY_TOLERANCE = 1e-12  # change of a step, relative: the limit of double precision
 
@@ -374,59 +373,47 @@ def _squares_at_shift(system: _System, shift: float, n_modes: int) -> FloatArray
 def _solve_sparse(model: StructuralModel, n_modes: int | None, up_to_hz: float | None) -> ModalBasis:
     system = _System.of(model)
     frequency_hz = _first_shift_hz(system, up_to_hz)
-    if model.allows_negative_stiffness:
-        frequency_hz = _definite_shift_hz(system, frequency_hz)
     try:
         basis = _solve_at_shift(model, system, frequency_hz, n_modes, up_to_hz)
     except ConvergenceError:  # parts of a held structure may be loose all the same: shift them farther from 0
         return _solve_at_shift(model, system, SHIFT / HELD_SHIFT * frequency_hz, n_modes, up_to_hz)
-    elastic_hz = basis.natural_frequency_hz[basis.n_rigid :]
+    elastic_hz, frequency_hz = basis.natural_frequency_hz[basis.n_rigid :], np.sqrt(basis.shift) / (2 * np.pi)
     is_far = elastic_hz.size and not USEFUL_SHIFTS[0] <= frequency_hz / elastic_hz[0] <= USEFUL_SHIFTS[1]
     if is_far and basis.eigenvalues[0] >= 0:
         basis = _solve_at_shift(model, system, SHIFT * float(elastic_hz[0]), n_modes, up_to_hz)
     return basis
 
 
-def _definite_shift_hz(system: _System, frequency_hz: float) -> float:
-    """Raise a shift until the stiffness with it is positive definite, in the place of negative eigenvalues."""
-    for _ in range(SHIFTS_UP):
-        shifted = system.stiffness + (2 * np.pi * frequency_hz) ** 2 * system.mass
-        if is_positive_definite(sparse.csr_array(shifted), system.node_numbers):
-            return frequency_hz
-        frequency_hz *= float(np.sqrt(SHIFT_UP))
-    raise np.linalg.LinAlgError
-
-
 def _solve_at_shift(
     model: StructuralModel, system: _System, frequency_hz: float, n_modes: int | None, up_to_hz: float | None
 ) -> ModalBasis:
-    """Find modes with one factorization; twice as many each time until the highest lies above the limit."""
-    shift = (2 * np.pi * frequency_hz) ** 2
-    order = model.n_modes
-    factor = factorize(system.stiffness + shift * system.mass, system.node_numbers)
-    count = min(n_modes or FIRST_MODES, FIRST_MODES if up_to_hz else order, order - 1)
-    while True:
-        shapes = _lanczos(system, factor, shift, count)
-        basis = _orthonormalised(model, system, shapes, factor, shift)
-        max_count = min(n_modes or order - 1, order - 1)
-        if up_to_hz is None or count == max_count or basis.natural_frequency_hz[-1] > up_to_hz:
-            return basis
-        count = min(2 * count, max_count)
+    """Find modes with one factorization."""
+    factor, shift = _factor_at_shift(model, system, (2 * np.pi * frequency_hz) ** 2)
+    shapes = _lanczos(system, factor, shift, min(n_modes or model.n_modes, model.n_modes), up_to_hz)
+    return _orthonormalised(model, system, shapes, factor, shift)
 
 
-def _lanczos(system: _System, factor: Factorization, shift: float, n_modes: int) -> FloatArray:
-    order = system.mass.shape[0]
-    inverse = sparse_linalg.LinearOperator((order, order), matvec=factor.solve, dtype=np.float64)
-    start = np.random.default_rng(0).standard_normal(order)  # the start vector of ARPACK differs from run to run
-    try:
-        eigenvalues, shapes = sparse_linalg.eigsh(
-            system.stiffness, n_modes, M=system.mass, sigma=-shift, which="LM", OPinv=inverse, v0=start
-        )
-    except sparse_linalg.ArpackNoConvergence as error:
-        raise ConvergenceError(
-            f"the eigensolver found {len(error.eigenvalues)} of {n_modes} modes; request fewer modes or a lower band"
-        ) from None
-    return np.asarray(shapes[:, np.argsort(eigenvalues)])
+def _factor_at_shift(model: StructuralModel, system: _System, shift: float) -> tuple[Factorization, float]:
+    """Factor the shifted stiffness; with a larger shift where negative eigenvalues are meant, or feigned by digits."""
+    for _ in range(SHIFTS_UP):
+        try:
+            return factorize(sparse.csr_array(system.stiffness + shift * system.mass), system.node_numbers), shift
+        except IllConditionedError:
+            if not (model.allows_negative_stiffness or system.in_print):
+                raise
+        shift *= SHIFT_UP
+    raise np.linalg.LinAlgError
+
+
+def _lanczos(system: _System, factor: Factorization, shift: float, n_modes: int, up_to_hz: float | None) -> FloatArray:
+    """Shapes of the lowest modes, up to one beyond the frequency, or as many as are sought."""
+    return largest_pairs(
+        factor.solve,
+        lambda block: multiply(system.mass, block),
+        order=system.mass.shape[0],
+        count=n_modes,
+        least=None if up_to_hz is None else 1 / ((2 * np.pi * up_to_hz) ** 2 + shift),
+    )
 
 
 def _first_shift_hz(system: _System, up_to_hz: float | None) -> float:
@@ -603,6 +590,10 @@ class _Constrained:
 
     factor: Factorization
     motions: Matrix
+
+    @property
+    def made_by(self) -> str:
+        return self.factor.made_by
 
     def solve(self, loads: FloatArray) -> FloatArray:
         inner = self.factor.solve(multiply(sparse.csr_array(self.motions.T), loads))

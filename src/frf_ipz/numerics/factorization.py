@@ -1,8 +1,8 @@
 """Factors of large symmetric positive definite matrices, for solves with many right-hand sides.
 
-SciPy's SuperLU in its symmetric mode, on a nested dissection by METIS, is what every installation has. CHOLMOD
-(scikit-sparse) or PARDISO (pypardiso) take its place where the user has installed them; they are faster on solids, and
-their licences keep them out of the requirements.
+The multifrontal factors of this package (`multifrontal`), on a nested dissection by METIS, are what every installation
+has. CHOLMOD (scikit-sparse) or PARDISO (pypardiso) take their place where the user has installed them: they use several
+cores, and their licences keep them out of the requirements.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import weakref
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -17,18 +18,31 @@ from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.errors import IllConditionedError
+from frf_ipz.errors import IllConditionedError, InputError
+from frf_ipz.numerics.free_memory import free_memory_bytes
+from frf_ipz.numerics.multifrontal import CholeskyFactors, Elimination
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import Matrix
 
 DENSE_ORDER = 600  # below, LAPACK on full matrices is faster than any sparse factor
 POSITIVE_DEFINITE = 2  # PARDISO's name for real, symmetric, positive definite
-SYMMETRIC_MODE = {"SymmetricMode": True}
+NOT_POSITIVE_DEFINITE = -4  # PARDISO's name for a pivot that is zero or negative
+GIGABYTE = 1e9
 
 
 class Factorization(Protocol):
-    """Factors of a matrix, to solve linear systems with."""
+    """Factors of a matrix, to solve linear systems with.
+
+    Parameters
+    ----------
+    made_by : str
+        The package and, where it is not this one, its version.
+    """
+
+    @property
+    def made_by(self) -> str:
+        """The package that made the factors."""
 
     def solve(self, loads: FloatArray) -> FloatArray:
         """Solve for several right-hand sides at once.
@@ -64,21 +78,25 @@ def factorize(matrix: Matrix, nodes: IntArray) -> Factorization:
     ------
     IllConditionedError
         If the matrix is singular.
+    InputError
+        If the factors need more memory than there is: says how much, and what to do.
     """
     if matrix.shape[0] < DENSE_ORDER:
         return _dense(matrix)
-    cholmod, pardiso = _import_optional("sksparse.cholmod"), _import_optional("pypardiso")
-    if cholmod is not None and hasattr(cholmod, "cholesky"):
-        factor = cholmod.cholesky(sparse.csc_matrix(matrix))
-        if callable(factor):  # as in scikit-sparse 0.4
-            return _Cholmod(factor)
-    if pardiso is not None:
-        return _Pardiso.of(matrix, pardiso)
-    return _superlu(matrix, nodes)
+    elimination = plan_elimination(matrix, nodes)
+    _require_memory(elimination, matrix.shape[0])
+    for attempt in (_cholmod, _pardiso):
+        factors = attempt(matrix)
+        if factors is not None:
+            return factors
+    try:
+        return _Multifrontal(CholeskyFactors.of(matrix, elimination))
+    except np.linalg.LinAlgError:
+        raise _singular_error(matrix) from None
 
 
 def is_positive_definite(matrix: Matrix, nodes: IntArray) -> bool:
-    """Test whether a symmetric matrix is positive definite, by the signs of its pivots (Sylvester's law of inertia).
+    """Test whether a symmetric matrix is positive definite, by whether it has a Cholesky factor.
 
     Parameters
     ----------
@@ -93,11 +111,58 @@ def is_positive_definite(matrix: Matrix, nodes: IntArray) -> bool:
         False as well where it is singular to rounding.
     """
     try:
-        factor = _superlu(matrix, nodes).factor
+        factorize(matrix, nodes)
     except IllConditionedError:
         return False
-    has_diagonal_pivots = bool((factor.perm_r == factor.perm_c).all())
-    return has_diagonal_pivots and bool((factor.U.diagonal() > 0).all())
+    return True
+
+
+def plan_elimination(matrix: Matrix, nodes: IntArray) -> Elimination:
+    """Put the rows of a matrix in an order that keeps its factors sparse, and find how large these are.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse array
+        The matrix; both triangles.
+    nodes : (n,) int array
+        Node of each row.
+
+    Returns
+    -------
+    Elimination
+        The order, and the fronts of the factors.
+    """
+    order = matrix.shape[0]
+    _, group = np.unique(nodes, return_inverse=True)
+    members = sparse.csr_array((np.ones(order), (group, np.arange(order))))
+    graph = sparse.csr_array(members @ abs(matrix).sign() @ members.T)
+    graph = sparse.csr_array(graph + graph.T)  # METIS reads beyond its arrays where an edge lacks its way back
+    graph.setdiag(0)
+    graph.eliminate_zeros()
+    pymetis = _import_optional("pymetis")
+    if pymetis is None:
+        permutation = _minimum_degree(graph)
+    else:
+        permutation = np.asarray(pymetis.nested_dissection(pymetis.CSRAdjacency(graph.indptr, graph.indices))[0])
+    return Elimination.of(graph, group, permutation)
+
+
+def _minimum_degree(graph: Matrix) -> IntArray:
+    """Order nodes where METIS is missing (there is no wheel for Windows): SuperLU's own, of factors with no fill."""
+    diagonal = sparse.diags_array(1.0 + np.asarray(graph.sum(axis=1)).ravel())
+    dominant = sparse.csc_array(diagonal - graph)
+    return np.argsort(sparse_linalg.spilu(dominant, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A").perm_c)
+
+
+def _require_memory(elimination: Elimination, order: int) -> None:
+    free = free_memory_bytes()
+    if free is not None and elimination.peak_bytes > free:
+        raise InputError(
+            f"the factors of {order} DOFs need {elimination.peak_bytes / GIGABYTE:.1f} GB, and "
+            f"{free / GIGABYTE:.1f} GB of memory are free: close other programs, take a machine with more memory, "
+            "or give a coarser mesh; the FE program can also condense the model (Guyan, Craig-Bampton) to some "
+            "thousand DOFs"
+        )
 
 
 def _dense(matrix: Matrix) -> _Dense:
@@ -107,38 +172,38 @@ def _dense(matrix: Matrix) -> _Dense:
         raise _singular_error(matrix) from None
 
 
-def _superlu(matrix: Matrix, nodes: IntArray) -> _SuperLu:
-    """Factor with pivots kept on the diagonal, which a symmetric positive definite matrix allows."""
-    order = _nested_dissection(matrix, nodes)
-    ordered = sparse.csc_array(matrix[order][:, order] if order is not None else matrix)
-    try:
-        factor = sparse_linalg.splu(
-            ordered,
-            permc_spec="MMD_AT_PLUS_A" if order is None else "NATURAL",
-            diag_pivot_thresh=0.0,
-            options=SYMMETRIC_MODE,
-        )
-    except RuntimeError:  # SuperLU met a pivot that is exactly 0
-        raise _singular_error(matrix) from None
-    return _SuperLu(factor, np.arange(matrix.shape[0]) if order is None else order)
-
-
-def _nested_dissection(matrix: Matrix, nodes: IntArray) -> IntArray | None:
-    """Put nodes in an order that keeps factors sparse; None without METIS (there is no wheel for Windows)."""
-    pymetis = _import_optional("pymetis")
-    if pymetis is None:
+def _cholmod(matrix: Matrix) -> _Cholmod | None:
+    """Factor by scikit-sparse of any version; None where there is none."""
+    cholmod = _import_optional("sksparse.cholmod")
+    if cholmod is None:
         return None
-    order = matrix.shape[0]
-    _, group = np.unique(nodes, return_inverse=True)
-    members = sparse.csr_array((np.ones(order), (group, np.arange(order))))
-    graph = sparse.csr_array(members @ abs(matrix).sign() @ members.T)
-    graph = sparse.csr_array(graph + graph.T)  # METIS reads beyond its arrays where an edge lacks its way back
-    graph.setdiag(0)
-    graph.eliminate_zeros()
-    rank = np.empty(graph.shape[0], np.int64)
-    permutation = pymetis.nested_dissection(pymetis.CSRAdjacency(graph.indptr, graph.indices))[0]
-    rank[np.asarray(permutation)] = np.arange(graph.shape[0])
-    return np.argsort(rank[group], kind="stable")
+    columns = sparse.csc_matrix(matrix)
+    made_by = f"CHOLMOD (scikit-sparse {_version('scikit-sparse')})"
+    try:
+        if hasattr(cholmod, "cho_factor"):  # since 0.5
+            return _Cholmod(cholmod.cho_factor(columns).solve, made_by)
+        factor = cholmod.cholesky(columns)
+    except cholmod.CholmodNotPositiveDefiniteError:
+        raise _singular_error(matrix) from None
+    return _Cholmod(factor, made_by) if callable(factor) else None
+
+
+def _pardiso(matrix: Matrix) -> _Pardiso | None:
+    """Factor by pypardiso; None where there is none."""
+    pardiso = _import_optional("pypardiso")
+    if pardiso is None:
+        return None
+    solver = pardiso.PyPardisoSolver(mtype=POSITIVE_DEFINITE)
+    triangle = sparse.csr_matrix(sparse.triu(matrix))
+    factors = _Pardiso(solver, triangle, f"PARDISO (pypardiso {_version('pypardiso')})")
+    weakref.finalize(factors, solver.free_memory, everything=True)  # MKL holds the factors until told to free them
+    try:
+        solver.factorize(triangle)
+    except Exception as error:  # of a type that the package does not show
+        if getattr(error, "value", None) != NOT_POSITIVE_DEFINITE:
+            raise
+        raise _singular_error(matrix) from None
+    return factors
 
 
 def _import_optional(name: str) -> Any:  # noqa: ANN401 - a module
@@ -147,6 +212,13 @@ def _import_optional(name: str) -> Any:  # noqa: ANN401 - a module
         return import_module(name)
     except ImportError:
         return None
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:  # installed by other means than Python's
+        return "of unknown version"
 
 
 def _singular_error(matrix: Matrix) -> IllConditionedError:
@@ -159,25 +231,25 @@ def _singular_error(matrix: Matrix) -> IllConditionedError:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Dense:
     factor: tuple[FloatArray, bool]
+    made_by: str = "LAPACK"
 
     def solve(self, loads: FloatArray) -> FloatArray:
         return np.asarray(linalg.cho_solve(self.factor, loads))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _SuperLu:
-    factor: sparse_linalg.SuperLU
-    order: IntArray
+class _Multifrontal:
+    factors: CholeskyFactors
+    made_by: str = "multifrontal factors of frf_ipz"
 
     def solve(self, loads: FloatArray) -> FloatArray:
-        solution = np.empty_like(loads)
-        solution[self.order] = self.factor.solve(loads[self.order])
-        return solution
+        return self.factors.solve(loads)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cholmod:
     factor: Any
+    made_by: str
 
     def solve(self, loads: FloatArray) -> FloatArray:
         return np.asarray(self.factor(loads))
@@ -187,16 +259,7 @@ class _Cholmod:
 class _Pardiso:
     solver: Any
     triangle: Any
-
-    @classmethod
-    def of(cls, matrix: Matrix, pardiso: Any) -> _Pardiso:  # noqa: ANN401 - a module
-        solver = pardiso.PyPardisoSolver(mtype=POSITIVE_DEFINITE)
-        triangle = sparse.csr_matrix(sparse.triu(matrix))
-        solver.factorize(triangle)
-        factorization = cls(solver, triangle)
-        # MKL holds the factors until told to free them
-        weakref.finalize(factorization, solver.free_memory, everything=True)
-        return factorization
+    made_by: str
 
     def solve(self, loads: FloatArray) -> FloatArray:
         return np.asarray(self.solver.solve(self.triangle, loads))

@@ -10,10 +10,10 @@ from scipy.sparse import linalg as linalg_sparse
 
 from fe_models import structural_model
 from frf_ipz.dofs import Dof
-from frf_ipz.errors import IllConditionedError
+from frf_ipz.errors import IllConditionedError, InputError
 from frf_ipz.fe.eigen import solve_basis
-from frf_ipz.numerics import factorization
-from frf_ipz.numerics.factorization import DENSE_ORDER, factorize, is_positive_definite
+from frf_ipz.numerics import factorization, multifrontal
+from frf_ipz.numerics.factorization import DENSE_ORDER, factorize, is_positive_definite, plan_elimination
 
 SOLVED = 1e-10  # relative error of a solution: condition numbers here are below 1e4
 NODES_ACROSS, NODES_ALONG, PER_NODE = 15, 30, 2
@@ -52,25 +52,50 @@ def require_solves(matrix=None, names=None):
     return factor
 
 
-def test_metis_keeps_the_factor_sparse(only):
-    only(pymetis=pytest.importorskip("pymetis"))
-    ordered = require_solves().factor.nnz
+def shuffled_grid():
     shuffled = np.random.default_rng(5).permutation(grid().shape[0])
-    matrix = sparse.csc_array(grid()[shuffled][:, shuffled])
-    unordered = linalg_sparse.splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0).nnz
-    assert ordered < 0.2 * unordered
+    return sparse.csc_array(grid()[shuffled][:, shuffled]), nodes()[shuffled]
 
 
-def test_without_metis_the_ordering_of_superlu_does(monkeypatch):
-    # there is no wheel for Windows
-    for package in ("pymetis", "sksparse.cholmod", "pypardiso"):
+@pytest.mark.parametrize("has_metis", [True, False])
+def test_an_order_of_nodes_keeps_factors_sparse(monkeypatch, has_metis):
+    monkeypatch.setattr(multifrontal, "FRONT_OVERHEAD", 0.0)
+    if not has_metis:  # there is no wheel for Windows
+        monkeypatch.setitem(sys.modules, "pymetis", None)
+    for package in ("sksparse.cholmod", "pypardiso"):
         monkeypatch.setitem(sys.modules, package, None)
-    shuffled = np.random.default_rng(5).permutation(grid().shape[0])
-    matrix = sparse.csc_array(grid()[shuffled][:, shuffled])
-    factor = require_solves(matrix, nodes()[shuffled]).factor
-    unordered = linalg_sparse.splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0)
-    assert factor.nnz < 0.2 * unordered.nnz
-    assert is_positive_definite(matrix, nodes()[shuffled])
+    matrix, names = shuffled_grid()
+    ordered = require_solves(matrix, names).factors.elimination.factor_bytes / np.dtype(float).itemsize
+    unordered = linalg_sparse.splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0).L.nnz
+    assert ordered < 0.3 * unordered
+    assert is_positive_definite(matrix, names)
+
+
+def test_few_large_fronts_take_the_place_of_many_small_ones(monkeypatch):
+    matrix, names = shuffled_grid()
+    few = plan_elimination(matrix, names)
+    monkeypatch.setattr(multifrontal, "FRONT_OVERHEAD", 0.0)
+    assert len(few.fronts) < 0.3 * len(plan_elimination(matrix, names).fronts)
+
+
+def test_bodies_that_are_not_joined_are_solved_together():
+    pair = sparse.csr_array(sparse.block_diag([grid(), 3.0 * grid(), sparse.eye_array(2)]))
+    names = np.concatenate([nodes(), nodes() + 1000, [5000, 5001]])
+    require_solves(pair, names)
+
+
+def test_factors_that_do_not_fit_are_refused_before_they_are_computed(monkeypatch):
+    monkeypatch.setattr(factorization, "free_memory_bytes", lambda: 1000)
+    monkeypatch.setattr(factorization.CholeskyFactors, "of", None)  # is not called
+    with pytest.raises(InputError, match=r"factors of 900 DOFs need 0\.0 GB, .* coarser mesh"):
+        factorize(grid(), nodes())
+
+
+def test_what_is_planned_is_what_is_taken():
+    elimination = plan_elimination(grid(), nodes())
+    factors = multifrontal.CholeskyFactors.of(grid(), elimination)
+    assert sum(part.nbytes for part in (*factors.triangles, *factors.rest)) == elimination.factor_bytes
+    assert elimination.factor_bytes < elimination.peak_bytes < 3 * elimination.factor_bytes
 
 
 def test_one_node_need_not_be_in_one_piece(only):
@@ -86,6 +111,8 @@ def test_cholmod_is_used_where_it_is_installed(only):
     formats = []
 
     class Cholmod:
+        CholmodNotPositiveDefiniteError = ArithmeticError
+
         @staticmethod
         def cholesky(matrix):
             formats.append(matrix.format)
@@ -97,14 +124,24 @@ def test_cholmod_is_used_where_it_is_installed(only):
     assert formats == ["csc"]
 
 
-def test_another_interface_of_cholmod_is_not_used(only):
+def test_the_present_interface_of_cholmod_is_used(only):
+    class Factor:
+        def __init__(self, matrix):
+            self.lower = linalg.cho_factor(matrix.toarray(), lower=True)
+
+        def solve(self, loads):
+            return linalg.cho_solve(self.lower, loads)
+
     class Newer:
+        CholmodNotPositiveDefiniteError = ArithmeticError
+        cho_factor = Factor
+
         @staticmethod
         def cholesky(matrix):
-            return matrix.toarray(), None
+            return matrix, None
 
     only(sksparse_cholmod=Newer)
-    require_solves()
+    assert require_solves().made_by.startswith("CHOLMOD (scikit-sparse")
 
 
 def test_pardiso_is_used_where_it_is_installed_and_gives_back_its_memory(only):
@@ -136,7 +173,9 @@ def test_pardiso_is_used_where_it_is_installed_and_gives_back_its_memory(only):
 
 def test_real_pardiso_solves():
     pytest.importorskip("pypardiso", reason="pypardiso is an extra with a licence of its own")
-    require_solves()
+    assert require_solves().made_by.startswith("PARDISO (pypardiso 0.")
+    with pytest.raises(IllConditionedError, match="singular or indefinite"):
+        factorize(grid(-0.5), nodes())
 
 
 def test_small_matrices_are_solved_in_full():
