@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from frf_ipz.cli.main import main
@@ -53,8 +54,9 @@ class Command:
 
     def signal(self, number):
         """Send a signal, if it is still at work."""
-        if self._process.is_alive():
-            os.kill(self._process.pid, number)
+        with suppress(ProcessLookupError):  # it may have come to its end since it was asked
+            if self._process.is_alive():
+                os.kill(self._process.pid, number)
 
     def wait(self):
         """Wait for the end; its exit status, negative for a signal."""
@@ -108,7 +110,8 @@ def _context():
 
 def _work(arguments, log, counter, options):
     sys.dont_write_bytecode = True
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background inherits that it is ignored
+    # A job in the background inherits that it is ignored; before the command listens there is nothing to clear up.
+    signal.signal(signal.SIGINT, lambda number, _: os._exit(128 + number))
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     for stream in (1, 2):
         os.dup2(descriptor, stream)

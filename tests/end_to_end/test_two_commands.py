@@ -79,6 +79,8 @@ def look_at_page(command):
     while address is None and command.is_at_work:
         address = re.search(r"http://\S+", command.said)
         command.pause()
+    if address is None:  # it was stopped before
+        return
     with suppress(OSError):
         urllib.request.urlopen(address[0] + "state", timeout=60).read()
         assert b"<html" in urllib.request.urlopen(address[0], timeout=60).read()

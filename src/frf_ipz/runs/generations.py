@@ -217,7 +217,9 @@ class Generations:
                 sync_folder(folder)
             write_text(self.path / HIDDEN / POINTER, f"{self.number}\n")
         except BaseException:
-            if _current_number(self.path) != self.number:
+            if _current_number(self.path) == self.number:  # a signal came when all was in its place
+                to_its_end(lambda: self._clear_up(self.number))
+            else:
                 self._take_back(placing, self.staging)
                 _remove(placing)
             raise

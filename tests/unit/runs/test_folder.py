@@ -11,12 +11,14 @@ import pytest
 import frf_ipz
 from frf_ipz.errors import InputError
 from frf_ipz.input_files import digest_file
+from frf_ipz.runs import generations
 from frf_ipz.runs.digests import digest
 from frf_ipz.runs.folder import open_run, read_manifest, read_run
 from frf_ipz.runs.folder_lock import LOCK
 from frf_ipz.runs.generations import POINTER, current_folder
 from frf_ipz.runs.stage_file import SUFFIX
 from small_results import number_in, stage, write_text
+from whole_results import faults_after_a_command
 
 
 def contents(folder):
@@ -96,6 +98,25 @@ def test_a_run_that_fails_leaves_what_was_there(tmp_path):
         stage(folder, "b", 2)
         _ = 1 / 0
     assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("step", ["write_text", "_remove"])
+def test_a_signal_while_results_take_their_place_leaves_nothing_lying_about(tmp_path, monkeypatch, step):
+    """It comes when the step has been done, once: only the next command would clear up."""
+    with open_run(tmp_path) as folder:
+        stage(folder, "a", 1)
+    original = getattr(generations, step)
+
+    def interrupted(*arguments):
+        original(*arguments)
+        monkeypatch.undo()
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), open_run(tmp_path) as folder:
+        stage(folder, "b", 2)
+        monkeypatch.setattr(generations, step, interrupted)
+    assert number_in(read_run(tmp_path).load("model")) == 2
+    assert faults_after_a_command(tmp_path) == []
 
 
 def test_a_first_run_that_fails_leaves_no_folder(tmp_path):
