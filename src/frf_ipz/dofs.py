@@ -352,11 +352,9 @@ def parse_dof(text: str) -> Dof:
     match = _LABEL.match(text) if isinstance(text, str) else None
     if match is None:
         is_sum = len(_LABELS_WITHIN.findall(str(text))) > 1 or ("(" in str(text) and ":" in str(text))
-        way_out = (
-            "; a sum or a multiple of DOFs is a [[port]] of model.toml, and its name stands here" if is_sum else ""
-        )
+        hint = "; a sum or a multiple of DOFs is a [[port]] of model.toml, and its name stands here"
         expected = "expected NODE:SIGN DIRECTION as in '18:+z', '20:-z' or '7:rz'"
-        raise InputError(f"'{text}' is no DOF label; {expected}{way_out}")
+        raise InputError(f"'{text}' is no DOF label; {expected}{hint * is_sum}")
     node, sign, direction = match.groups()
     return Dof(int(node), direction, -1 if sign == "-" else 1)
 

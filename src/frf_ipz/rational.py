@@ -81,7 +81,8 @@ class PoleResidueModel(Concise):
         """
         values = partial_fractions(s, self.poles) @ self.residues
         values += partial_fractions(s, self.conjugates) @ self.residues[self.poles.imag > 0].conj()
-        values += np.stack([(s / self.scale_rad_s) ** power for power in self.powers], 1) @ self.coefficients
+        for power, coefficients in zip(self.powers, self.coefficients, strict=True):
+            values += ((s / self.scale_rad_s) ** power)[:, None] * coefficients
         return values * np.exp(-s[:, None] * self.delay_s)
 
     @property

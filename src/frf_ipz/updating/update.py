@@ -21,6 +21,7 @@ from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.progress import silent
 from frf_ipz.structure import ReducedModel, StructuralModel
 from frf_ipz.updating import methods
+from frf_ipz.updating.fall_back import keep_if_better
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import ParameterBasis, make_structural_basis
 from frf_ipz.updating.position_uncertainty import with_position_uncertainty
@@ -138,6 +139,12 @@ def update_model(
     problem = make_problem(reduced_model, fit, paired, basis)
     problem = replace(problem, covariance=with_position_uncertainty(problem, position_uncertainty))
     updated = with_free_rigid_bodies(cast("Method", module).update(problem, chosen, progress))
+    scaled = _with_scales(updated, fit, paired)
+    kept = keep_if_better(scaled, fit)
+    return scaled if kept is scaled else _with_scales(kept, fit, paired)
+
+
+def _with_scales(updated: UpdatedModel, fit: ModalFit, paired: Pairs) -> UpdatedModel:
     return replace(
         updated,
         scale=fit_scale(fit, paired, updated.model, updated.after, updated.ensemble),

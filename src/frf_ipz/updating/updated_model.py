@@ -50,6 +50,7 @@ class UpdateStatus(Enum):
     MAX_ITERATIONS = "stopped at the largest number of iterations: allow more, or look at the pairs"
     NOTHING_TO_DO = "there is no target in the band: the model is unchanged"
     DIVERGED = "the misfit grew: a smaller step or other pairs may help"
+    NO_BETTER = "it made the agreement with the measured FRFs worse: the model is as it was before"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

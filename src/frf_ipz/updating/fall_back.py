@@ -1,0 +1,84 @@
+"""Back to the nominal model, where an update has made the agreement with the measured FRFs worse.
+
+An update moves poles and zeros to those that were measured. Where some are paired wrongly (many light local modes in
+few sensors), the FRFs in between move away from the measurement. So the median deviation of the measured FRFs, in dB,
+is compared before and after; the noise of the fitted FRFs is what it may grow by without meaning anything.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.identification.modal_fit import ModalFit
+
+DB = 20.0 / np.log(10.0)  # of a small relative deviation
+
+
+def keep_if_better(updated: UpdatedModel, fit: ModalFit) -> UpdatedModel:
+    """Keep an updated model, or fall back to the nominal one where that is nearer to the measured FRFs.
+
+    Parameters
+    ----------
+    updated : UpdatedModel
+        The result of a method, with its scales.
+    fit : ModalFit
+        The fitted model of the measured FRFs.
+
+    Returns
+    -------
+    UpdatedModel
+        As it was; or the nominal model with the spread of the ensemble around it and a warning, its scale still to be
+        fitted.
+    """
+    if not fit.labels or updated.model is updated.nominal or not len(updated.after):
+        return updated
+    s: ComplexArray = np.asarray(2j * np.pi * fit.frequency_hz)
+    measured = np.abs(fit.model(s))
+    is_heard = measured > fit.value_std
+    if not is_heard.any():
+        return updated
+
+    def deviation_db(*, nominal: bool) -> float:
+        values = np.abs(updated.compute_frfs(fit.labels, s, nominal=nominal))[is_heard]
+        return float(np.median(np.abs(DB * np.log(np.maximum(values, np.finfo(float).tiny) / measured[is_heard]))))
+
+    before_db, after_db = deviation_db(nominal=True), deviation_db(nominal=False)
+    noise_db = float(np.median(DB * fit.value_std[is_heard] / measured[is_heard]))
+    if not after_db > before_db + noise_db:
+        return updated
+    nominal = updated.nominal
+    return replace(
+        updated,
+        model=nominal,
+        status=UpdateStatus.NO_BETTER,
+        after=updated.before,
+        ensemble=_around_nominal(updated),
+        parts=pd.DataFrame(),
+        warnings=(
+            *updated.warnings,
+            f"with the update the model is {after_db:.2g} dB off the measured FRFs (median), without it "
+            f"{before_db:.2g} dB: it is taken as it was before. Some poles or zeros may be paired wrongly: look at the "
+            "pairs, measure at more points, or set a narrower [fit] band_hz",
+        ),
+    )
+
+
+def _around_nominal(updated: UpdatedModel) -> FloatArray:
+    """Move the ensemble to the nominal model; a member that is no structure there becomes the nominal model."""
+    nominal, model = updated.nominal, updated.model
+    centre = np.stack([nominal.mass, nominal.damping, nominal.stiffness])
+    moved = updated.ensemble + (centre - np.stack([model.mass, model.damping, model.stiffness]))
+    for place, (mass, _, stiffness) in enumerate(moved):
+        lowest = np.linalg.eigvalsh(np.stack([mass, stiffness]))[:, 0]
+        allowed = np.linalg.eigvalsh(np.stack([nominal.mass, nominal.stiffness]))[:, [0, -1]]
+        if lowest[0] <= 0.0 or lowest[1] < min(allowed[1, 0], 0.0) - np.finfo(float).eps * allowed[1, 1]:
+            moved[place] = centre
+    return np.asarray(moved)
