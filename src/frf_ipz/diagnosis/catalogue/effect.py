@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.model.motion import Motion
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -109,8 +110,8 @@ class Signature:
 
     Parameters
     ----------
-    motion : (n_all,) array
-        Weights of all DOFs.
+    motion : (n_all,) array, or Motion
+        Weights of all DOFs, or those that are not zero.
     shapes : (n_shapes, n_points) complex array
         Dynamic stiffness along the contour for amplitude 1.
     values : (n_shapes, n_parameters) array
@@ -129,11 +130,27 @@ class Signature:
     0
     """
 
-    motion: FloatArray
+    motion: FloatArray | Motion
     shapes: ComplexArray
     values: FloatArray
     amplitude: int = 0
     amplitudes: FloatArray | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """An effect as a motion that a channel reads instead of the stated one, for a fast search.
+
+    Parameters
+    ----------
+    channel : str
+        An output with one position.
+    motion : Motion
+        What it reads, with its sign.
+    """
+
+    channel: str
+    motion: Motion
 
 
 class Effect(ABC):
@@ -207,6 +224,11 @@ class Effect(ABC):
 
     def signature(self, context: ModelContext, location: Location) -> Signature | None:
         """Give the effect as one dynamic stiffness, if it is one; else it is searched from `start_values`."""
+        del context, location
+        return None
+
+    def reading(self, context: ModelContext, location: Location) -> Reading | None:
+        """Give the effect as what a channel reads instead, if it is that and has no parameters."""
         del context, location
         return None
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.model.layout import Layout, measure_extents
+from frf_ipz.diagnosis.model.motion import Motion
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.assembly import multiply
@@ -79,6 +80,14 @@ class ModelContext:
         return tuple(sorted(dof for dof in free if dof.direction in self.directions))
 
     @cached_property
+    def moving_nodes(self) -> dict[str, IntArray]:
+        """Nodes that move in each direction of the test, ascending."""
+        return {
+            direction: np.array([dof.node for dof in self.moving_dofs if dof.direction == direction], np.int64)
+            for direction in self.directions
+        }
+
+    @cached_property
     def mass_kg(self) -> float:
         """Mass of the structure, supported parts included."""
         direction = self.directions[0]
@@ -93,27 +102,39 @@ class ModelContext:
 
     def unit_motion(self, dof: Dof) -> FloatArray:
         """Motion of one DOF, (n_all,) array."""
-        motion = np.zeros(len(self.model.all_dofs))
-        motion[self.model.full_index(dof)] = 1.0
-        return motion
+        return self.motion(dof).dense(len(self.model.all_dofs))
 
-    def stiffness_against(self, motion: FloatArray) -> float:
+    def motion(self, dof: Dof) -> Motion:
+        """Motion of one DOF, by index."""
+        return Motion(rows=(self.model.full_index(dof),), weights=(1.0,))
+
+    def stiffness_against(self, motion: FloatArray | Motion) -> float:
         """Stiffness against a motion by the elastic modes near the band, N/m; N m/rad against a rotation."""
-        shapes = motion @ self.basis.loaded_shapes
-        squares = self.basis.modes.eigenvalues[: len(shapes)]
-        elastic = squares > 0
-        compliance = float(np.sum(shapes[elastic] ** 2 / squares[elastic]))
-        largest = float(np.max(np.sum(self.basis.loaded_shapes[:, elastic] ** 2 / squares[elastic], axis=1)))
+        shapes, squares, largest = self._elastic_modes
+        moving = Motion.of(motion)
+        amplitudes = np.array(moving.weights) @ shapes[list(moving.rows)]
+        compliance = float(np.sum(amplitudes**2 / squares))
         return 1.0 / max(compliance, 1e-6 * largest)
+
+    @cached_property
+    def _elastic_modes(self) -> tuple[FloatArray, FloatArray, float]:
+        """Elastic shapes near the band at all DOFs, their squared frequencies, and the largest compliance of a DOF."""
+        shapes = self.basis.loaded_shapes
+        squares = self.basis.modes.eigenvalues[: shapes.shape[1]]
+        elastic = squares > 0
+        shapes, squares = shapes[:, elastic], squares[elastic]
+        return shapes, squares, float(np.max(np.sum(shapes**2 / squares, axis=1)))
 
     def neighbouring_nodes(self, node: int, direction: str, furthest: int = 2) -> list[int]:
         """Nodes near one that move in a direction: as many on each side in a row, the nearest ones elsewhere."""
-        nodes = [dof.node for dof in self.moving_dofs if dof.direction == direction]
+        nodes = self.moving_nodes[direction]
         if self.model.kind in ("beam", "lumped"):
-            return [neighbour for neighbour in nodes if 0 < abs(neighbour - node) <= furthest]
-        here = self.positions[node]
-        candidates = (neighbour for neighbour in nodes if neighbour != node)
-        return sorted(candidates, key=lambda neighbour: self._distance(neighbour, here))[:NEAREST]
+            return [neighbour for neighbour in nodes.tolist() if 0 < abs(neighbour - node) <= furthest]
+        others = nodes[nodes != node]
+        geometry = self.model.geometry
+        positions = geometry.coordinates_m[np.searchsorted(geometry.nodes, others)]
+        distances = np.linalg.norm(positions - self.positions[node], axis=1)
+        return [int(neighbour) for neighbour in others[np.argsort(distances, kind="stable")[:NEAREST]]]
 
     def describe_node(self, node: int) -> str:
         """Name a node: its number, and its position on structures that have positions."""
@@ -122,6 +143,3 @@ class ModelContext:
         span = measure_extents(self.model)
         position = ", ".join(f"{axis} = {self.positions[node]['xyz'.index(axis)]:.3f} m" for axis in span)
         return f"node {node} ({position})"
-
-    def _distance(self, node: int, here: FloatArray) -> float:
-        return float(np.linalg.norm(self.positions[node] - here))

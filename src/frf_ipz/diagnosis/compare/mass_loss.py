@@ -18,6 +18,7 @@ from frf_ipz.diagnosis.catalogue.effect import (
     list_node_locations,
 )
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.dofs import Dof
 from frf_ipz.fe.changes import with_point_masses
 
 if TYPE_CHECKING:
@@ -61,10 +62,9 @@ class MassLoss(Effect):
     def signature(self, context: ModelContext, location: Location) -> Signature:
         """-s^2 m against the direction of the test."""
         node, direction = location.key
-        dof = next(d for d in context.moving_dofs if (d.node, d.direction) == (node, direction))
         (parameter,) = self.parameters(context, location)
         return Signature(
-            motion=context.unit_motion(dof),
+            motion=context.motion(Dof(int(str(node)), str(direction))),
             shapes=-(context.contour[None] ** 2),
             values=np.ones((1, 1)),
             amplitudes=np.geomspace(0.05, 1.0, 8) * parameter.high,

@@ -108,18 +108,26 @@ class Data:
 
     def gains(self, response: Response) -> FloatArray:
         """Real factors that bring the model's FRFs to the measured ones where scales are unknown, (n_frfs,) array."""
-        n_frfs = len(self.measured.labels)
-        if self.free_gains == "none":
-            return np.ones(n_frfs)
-        model, measured = self._weigh(response.values), self._weigh(self.measured.values)
-        products, squares = np.sum(model * measured, 1), np.sum(model**2, 1)
-        if self.free_gains == "common":
-            return np.full(n_frfs, products.sum() / squares.sum())
-        return np.asarray(products / squares)
+        return self._gains(response.values[:, :, None])[:, 0]
 
     def misfit(self, response: Response) -> FloatArray:
         """Whitened difference of measurement and model, (n_data,) array."""
         return self.whitening(self.measured.values - self.gains(response) * response.values)
+
+    def misfits(self, values: ComplexArray) -> FloatArray:
+        """Whitened differences of measurement and several models' FRFs, (n_points, n_frfs, n): (n_data, n) array."""
+        return self.whitening(self.measured.values[:, :, None] - self._gains(values) * values)
+
+    def _gains(self, values: ComplexArray) -> FloatArray:
+        """Real factors that bring several models' FRFs to the measured ones, (n_frfs, n) array."""
+        if self.free_gains == "none":
+            return np.ones(values.shape[1:])
+        model, measured = self._weigh(values), self._weigh(self.measured.values[:, :, None])
+        products, squares = np.sum(model * measured, 1), np.sum(model**2, 1)
+        if self.free_gains == "common":
+            products = np.broadcast_to(products.sum(0), products.shape)
+            squares = np.broadcast_to(squares.sum(0), squares.shape)
+        return np.asarray(products / squares)
 
     def slopes(self, response: Response, changes: ComplexArray) -> FloatArray:
         """Whitened changes of the model's FRFs, (n_data, n) array, projected on what unknown gains cannot change.
@@ -130,7 +138,7 @@ class Data:
         white = self.whitening(self.gains(response)[:, None] * changes)
         if self.free_gains == "none":
             return white
-        model = self._weigh(response.values)
+        model = self._weigh(response.values[:, :, None])[:, :, 0]
         by_frf = white.reshape(len(model), model.shape[1], -1)
         products, squares = np.einsum("fd,fdn->fn", model, by_frf), np.sum(model**2, 1)[:, None]
         if self.free_gains == "common":
@@ -139,8 +147,9 @@ class Data:
         return np.asarray((by_frf - model[:, :, None] * (products / squares)[:, None]).reshape(white.shape))
 
     def _weigh(self, values: ComplexArray) -> FloatArray:
-        """Weigh FRFs as misfits are weighed, (n_frfs, 2 n_points) array; by their size where there is no whitening."""
+        """Weigh FRFs as misfits are, (n_frfs, 2 n_points, n) array; by their size where there is no whitening."""
+        n_points, n_frfs, count = values.shape
         if self.whitening.factors.size:
-            return self.whitening(values).reshape(len(self.measured.labels), -1)
-        relative = (values / self.measured.size).T
+            return self.whitening(values).reshape(n_frfs, 2 * n_points, count)
+        relative = (values / self.measured.size[:, :, None]).swapaxes(0, 1)
         return np.concatenate([relative.real, relative.imag], axis=1)

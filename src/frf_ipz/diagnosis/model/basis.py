@@ -16,6 +16,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.model.motion import stack_motions
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import ModalBasis, solve_basis
 from frf_ipz.numerics.factorization import DENSE_ORDER
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import Matrix
     from frf_ipz.diagnosis.model.change import Change
+    from frf_ipz.diagnosis.model.motion import Motion
     from frf_ipz.dofs import AnyDof
     from frf_ipz.structure import StructuralModel
 
@@ -84,6 +86,21 @@ class Basis:
             The same in the basis.
         """
         return np.asarray(self.vectors.T @ multiply(matrix, self.vectors))
+
+    def project_motions(self, motions: Sequence[Motion]) -> FloatArray:
+        """Bring motions into these coordinates.
+
+        Parameters
+        ----------
+        motions : sequence of Motion
+            Of few DOFs each.
+
+        Returns
+        -------
+        (n_motions, q) array
+            How far each moves for each coordinate.
+        """
+        return np.asarray(stack_motions(motions, len(self.model.all_dofs)).T @ self.vectors)
 
 
 def make_basis(model: StructuralModel, highest_rad_s: float, measured: Sequence[AnyDof]) -> Basis:

@@ -2,27 +2,28 @@
 
 Many effects are one dynamic stiffness D on one motion p. The FRFs then change by ``-R_sp D / (1 + R_pp D) R_ph``: for
 every line the misfit is a quadratic of one complex number, whose three coefficients do not depend on the effect. All
-such effects at all locations, for all values of their parameters, cost a few operations a line each; the others are
-evaluated value by value. Misfits count by their logarithm.
+such effects at all locations, for all values of their parameters, cost a few operations a line each. Sensors that sit
+elsewhere read other rows of the same modal motion: all of them at all nodes are one product. The others are evaluated
+value by value. Misfits count by their logarithm.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.evidence.hypothesis import Component
 from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, compute_weights
+from frf_ipz.diagnosis.model.motion import Motion, stack_motions
 from frf_ipz.diagnosis.search.robust_refinement import Start, compute_robust_misfit
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.effect import Effect, Signature
+    from frf_ipz.diagnosis.catalogue.effect import Effect, Reading, Signature
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.evidence.fit import Fit
     from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.response import Response
 
 MOTIONS_AT_ONCE = 400  # motions: keeps arrays within some ten MB
+VALUES_AT_ONCE = 400_000  # complex numbers: the same
 AMPLITUDES = np.geomspace(1e-3, 300.0, 20)  # over the stiffness of the structure against the motion
 FINER_STEPS = tuple(np.geomspace(1 / step, step, 9) for step in (1.6, 1.1))  # times the best of them, twice
 LARGEST_FLEXIBILITY = 2500  # DOFs up to which the static flexibility of all of them is found
@@ -40,7 +42,7 @@ NEIGHBOURS_OF = 16  # best locations of each effect whose neighbours are scanned
 
 
 Terms: TypeAlias = tuple[FloatArray, ComplexArray, FloatArray, ComplexArray]
-"""Of the misfit of each line with a dynamic stiffness on a motion: constant, linear, square; and R_pp."""
+"""Of the misfit of each line with a dynamic stiffness on each motion: constant, linear, square; and R_pp."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,7 +62,7 @@ class Receptances:
 
 
 def evaluate_receptances(
-    base: Response, basis: Basis, layout: Layout, motions: FloatArray, missing_flexibility: FloatArray
+    base: Response, basis: Basis, layout: Layout, motions: Sequence[Motion], missing_flexibility: FloatArray
 ) -> Receptances:
     """Evaluate FRFs of motions.
 
@@ -72,8 +74,8 @@ def evaluate_receptances(
         Its coordinates.
     layout : Layout
         Sensors and excited points.
-    motions : (n_all, n_motions) array
-        Weights of all DOFs.
+    motions : sequence of Motion
+        Where effects act.
     missing_flexibility : (n_motions,) array
         Static flexibility that the basis lacks, m/N.
 
@@ -82,7 +84,7 @@ def evaluate_receptances(
     Receptances
         Of the motions.
     """
-    shapes = motions.T @ basis.vectors @ base.modes.vectors
+    shapes = basis.project_motions(motions) @ base.modes.vectors
     from_outputs, from_inputs = np.matmul(shapes, base.output_motion), np.matmul(shapes, base.input_motion)
     across = from_outputs[:, :, layout.output_index] * from_inputs[:, :, layout.input_index] * base.chain[:, None, :]
     s, modes = base.s[:, None], base.modes
@@ -94,15 +96,15 @@ def evaluate_receptances(
     return Receptances(across=np.moveaxis(across, 1, 2), at_motions=np.asarray(at_motions))
 
 
-def compute_missing_flexibility(basis: Basis, motions: FloatArray) -> FloatArray:
+def compute_missing_flexibility(basis: Basis, motions: Sequence[Motion]) -> FloatArray:
     """Find the static flexibility of motions that a basis lacks.
 
     Parameters
     ----------
     basis : Basis
         Of the nominal model.
-    motions : (n_all, n_motions) array
-        Weights of all DOFs.
+    motions : sequence of Motion
+        Where effects act.
 
     Returns
     -------
@@ -110,17 +112,95 @@ def compute_missing_flexibility(basis: Basis, motions: FloatArray) -> FloatArray
         m/N; zero for models that are too large.
     """
     model, shift = basis.model, basis.modes.shift
-    free = motions[~model.fixed]
-    if len(free) > LARGEST_FLEXIBILITY:
-        return np.zeros(motions.shape[1])
+    n_free = int(np.count_nonzero(~model.fixed))
+    if n_free > LARGEST_FLEXIBILITY:
+        return np.zeros(len(motions))
+    free = stack_motions(motions, len(model.all_dofs)).toarray()[~model.fixed]
     used = np.flatnonzero(np.abs(free).max(1) > 0)
-    loads = np.zeros((len(free), len(used)))
+    loads = np.zeros((n_free, len(used)))
     loads[used, np.arange(len(used))] = 1.0
     flexibility = basis.modes.factor.solve(loads)[used]
     whole = np.sum(free[used] * (flexibility @ free[used]), 0)
-    shapes = motions.T @ basis.vectors
+    shapes = basis.project_motions(motions)
     inside = np.sum(shapes * np.linalg.solve(basis.stiffness + shift * np.eye(len(basis.stiffness)), shapes.T).T, 1)
     return np.asarray(np.maximum(whole - inside, 0.0))
+
+
+def read_elsewhere(
+    base: Response, basis: Basis, layout: Layout, local: FloatArray, channel: str, motions: Sequence[Motion]
+) -> tuple[IntArray, ComplexArray]:
+    """Evaluate the FRFs of a channel that reads other motions.
+
+    Parameters
+    ----------
+    base : Response
+        Of the fit to build on.
+    basis : Basis
+        Its coordinates.
+    layout : Layout
+        Sensors and excited points.
+    local : (n_frfs,) array
+        Error of the local compliance of each FRF, m/N, as in the base.
+    channel : str
+        An output.
+    motions : sequence of Motion
+        What it might read.
+
+    Returns
+    -------
+    frfs : (n,) int array
+        Indices of the channel's FRFs.
+    values : (n_points, n, n_motions) complex array
+        These FRFs with each motion.
+    """
+    of_channel = np.array([name == channel for name, _ in layout.outputs])
+    frfs = np.flatnonzero(of_channel[layout.output_index])
+    shapes = basis.project_motions(motions) @ base.modes.vectors
+    receptance = np.matmul(shapes, base.input_motion)[:, :, layout.input_index[frfs]] + local[frfs]
+    return frfs, np.asarray(np.moveaxis(receptance, 1, 2) * base.chain[:, frfs, None])
+
+
+def group_readings(readings: Sequence[Reading]) -> Iterator[tuple[str, list[int]]]:
+    """Group readings of the same channel, as many at once as fit into memory.
+
+    Parameters
+    ----------
+    readings : sequence of Reading
+        Of any channels.
+
+    Yields
+    ------
+    channel : str
+        Whose readings they are.
+    indices : list of int
+        Of these readings.
+    """
+    channels: dict[str, list[int]] = {}
+    for index, reading in enumerate(readings):
+        channels.setdefault(reading.channel, []).append(index)
+    for channel, indices in channels.items():
+        for start in range(0, len(indices), MOTIONS_AT_ONCE):
+            yield channel, indices[start : start + MOTIONS_AT_ONCE]
+
+
+def _scan_readings(
+    components: Sequence[Component], readings: Sequence[Reading], base: Response, basis: Basis, layout: Layout,
+    local: FloatArray, measured: TransferFunctions, weights: FloatArray,
+) -> list[Start]:  # fmt: skip
+    """Find the cost of each channel reading another motion."""
+    squares = weights * np.abs(measured.values - base.values) ** 2
+    starts = []
+    for channel, members in group_readings(readings):
+        motions = [readings[member].motion for member in members]
+        frfs, values = read_elsewhere(base, basis, layout, local, channel, motions)
+        changed = np.sum(weights[:, frfs, None] * np.abs(measured.values[:, frfs, None] - values) ** 2, axis=1)
+        other_frfs = np.sum(np.delete(squares, frfs, axis=1), axis=1)
+        costs = np.sum(np.log1p(other_frfs[:, None] + changed), axis=0)
+        starts += [
+            Start(component=components[member], values=np.zeros(0), cost=float(cost))
+            for member, cost in zip(members, costs, strict=True)
+        ]
+    return starts
 
 
 def scan_signatures(
@@ -155,54 +235,79 @@ def scan_signatures(
     constant = np.sum(weights * np.abs(misfit) ** 2, 1)
     starts = []
     for group in _group_by_motion(signatures):
-        motions = np.stack([signatures[members[0]].motion for members in group], 1)
+        motions = [Motion.of(signatures[members[0]].motion) for members in group]
         receptances = evaluate_receptances(base, basis, layout, motions, compute_missing_flexibility(basis, motions))
-        linear = np.einsum("kf,kfp->kp", weights * misfit.conj(), receptances.across)
-        square = np.einsum("kf,kfp->kp", weights, np.abs(receptances.across) ** 2)
-        for column, members in enumerate(group):
-            terms = constant, linear[:, column], square[:, column], receptances.at_motions[:, column]
-            starts += [_best_amplitude(components[member], signatures[member], terms) for member in members]
+        linear = np.einsum("kf,kfp->pk", weights * misfit.conj(), receptances.across)
+        square = np.einsum("kf,kfp->pk", weights, np.abs(receptances.across) ** 2)
+        at_motions = np.ascontiguousarray(receptances.at_motions.T)
+        columns = {member: column for column, members in enumerate(group) for member in members}
+        for members in _group_by_shape(signatures, columns):
+            used = [columns[member] for member in members]
+            terms = constant, linear[used], square[used], at_motions[used]
+            values, costs = _best_amplitudes([signatures[member] for member in members], terms)
+            starts += [
+                Start(component=components[member], values=values_there, cost=cost)
+                for member, values_there, cost in zip(members, values, costs.tolist(), strict=True)
+            ]
     return starts
 
 
 def _group_by_motion(signatures: Sequence[Signature]) -> Iterator[list[list[int]]]:
     """Signatures on the same motion share their receptances; motions come in groups that fit into memory."""
-    members: dict[bytes, list[int]] = {}
+    members: dict[Motion, list[int]] = {}
     for index, signature in enumerate(signatures):
-        members.setdefault(signature.motion.tobytes(), []).append(index)
+        members.setdefault(Motion.of(signature.motion), []).append(index)
     groups = list(members.values())
     for start in range(0, len(groups), MOTIONS_AT_ONCE):
         yield groups[start : start + MOTIONS_AT_ONCE]
 
 
-def _best_amplitude(component: Component, signature: Signature, terms: Terms) -> Start:
-    at_motion = terms[3]
-    if signature.amplitudes is None:
-        scale = np.median(np.abs(at_motion)) * np.median(np.abs(signature.shapes), axis=1)
-        amplitudes = AMPLITUDES[None, :] / scale[:, None]
+def _group_by_shape(signatures: Sequence[Signature], members: Iterable[int]) -> Iterator[list[int]]:
+    """Signatures with as many shapes and amplitudes are scanned at once, as many as fit into memory."""
+    alike: dict[tuple[int, int], list[int]] = {}
+    for member in members:
+        signature = signatures[member]
+        count = len(AMPLITUDES) if signature.amplitudes is None else len(signature.amplitudes)
+        alike.setdefault((len(signature.shapes), count if signature.amplitudes is not None else 0), []).append(member)
+    for (n_shapes, count), indices in alike.items():
+        n_points = signatures[indices[0]].shapes.shape[1]
+        at_once = max(VALUES_AT_ONCE // (n_shapes * (count or len(AMPLITUDES)) * n_points), 1)
+        for start in range(0, len(indices), at_once):
+            yield indices[start : start + at_once]
+
+
+def _best_amplitudes(signatures: Sequence[Signature], terms: Terms) -> tuple[list[FloatArray], FloatArray]:
+    """Values of the parameters, and robust misfit, of each signature at its best."""
+    at_motion, number = terms[3], np.arange(len(signatures))
+    shapes = np.stack([signature.shapes for signature in signatures])
+    if signatures[0].amplitudes is None:
+        scale = np.median(np.abs(at_motion), axis=1)[:, None] * np.median(np.abs(shapes), axis=2)
+        amplitudes = AMPLITUDES / scale[:, :, None]
     else:
-        amplitudes = np.broadcast_to(signature.amplitudes, (len(signature.shapes), len(signature.amplitudes)))
-    costs = _costs(signature.shapes, amplitudes, terms)
-    shape, size = np.unravel_index(int(np.argmin(costs)), costs.shape)
-    best, cost = amplitudes[shape, size], costs[shape, size]
-    for factors in FINER_STEPS if amplitudes.shape[1] > 1 else ():
-        finer = best * factors
-        costs = _costs(signature.shapes[shape, None], finer[None], terms)[0]
-        nearest = int(np.argmin(costs))
-        best, cost = finer[nearest], costs[nearest]
-    values = signature.values[shape].copy()
-    if len(values):
-        values[signature.amplitude] *= best
-    return Start(component=component, values=values, cost=float(cost))
+        stated = np.array([signature.amplitudes for signature in signatures], float)
+        amplitudes = np.broadcast_to(stated[:, None], (*shapes.shape[:2], stated.shape[1]))
+    costs = _costs(shapes, amplitudes, terms).reshape(len(signatures), -1)
+    shape, size = np.unravel_index(np.argmin(costs, axis=1), amplitudes.shape[1:])
+    best, cost = amplitudes[number, shape, size], costs.min(axis=1)
+    for factors in FINER_STEPS if amplitudes.shape[2] > 1 else ():
+        finer = best[:, None] * factors
+        costs = _costs(shapes[number, shape][:, None], finer[:, None], terms)[:, 0]
+        nearest = np.argmin(costs, axis=1)
+        best, cost = finer[number, nearest], costs[number, nearest]
+    values = [signature.values[index].copy() for signature, index in zip(signatures, shape.tolist(), strict=True)]
+    for signature, values_there, amplitude in zip(signatures, values, best.tolist(), strict=True):
+        if len(values_there):
+            values_there[signature.amplitude] *= amplitude
+    return values, cost
 
 
 def _costs(shapes: ComplexArray, amplitudes: FloatArray, terms: Terms) -> FloatArray:
-    """Robust misfits of shapes times amplitudes, (n_shapes, n_amplitudes)."""
+    """Robust misfits of shapes times amplitudes, (n_motions, n_shapes, n_amplitudes)."""
     constant, linear, square, at_motion = terms
-    stiffness = amplitudes[:, :, None] * shapes[:, None, :]
-    effective = stiffness / (1 + at_motion * stiffness)
-    squares = constant + 2 * (effective * linear).real + np.abs(effective) ** 2 * square
-    return np.asarray(np.sum(np.log1p(np.maximum(squares, 0.0)), axis=2))
+    stiffness = amplitudes[..., None] * shapes[:, :, None]
+    effective = stiffness / (1 + at_motion[:, None, None] * stiffness)
+    squares = constant + 2 * (effective * linear[:, None, None]).real + np.abs(effective) ** 2 * square[:, None, None]
+    return np.asarray(np.sum(np.log1p(np.maximum(squares, 0.0)), axis=3))
 
 
 def scan_globally(problem: InferenceProblem, base: Fit) -> list[Start]:
@@ -274,36 +379,67 @@ def _scan(
     components = [component for effect in problem.effects.values() for component in list_components(effect, context)]
     weights = compute_weights(measured, error)
     response = base.hypothesis.respond(base.values, nuisance, measured.s)
-    scan = partial(_scan_with_signatures, context, measured, base, response, weights)
-    starts, without_signature = scan(components)
-    starts.sort(key=lambda start: start.cost)
-    starts += scan(_unlisted_neighbours(context, components, starts))[0]
-    starts += [
-        find_best_start(problem, base, component, measured, weights, nuisance) for component in without_signature
-    ]
+    basis, layout = base.hypothesis.basis, context.layout
+
+    def scan(shown: ShownComponents) -> list[Start]:
+        signed = scan_signatures(*shown.signed, response, basis, layout, measured, weights)
+        local = problem.nuisance_prior.unpack(nuisance).local
+        return signed + _scan_readings(*shown.read, response, basis, layout, local, measured, weights)
+
+    shown = show_components(context, components)
+    starts = sorted(scan(shown), key=lambda start: start.cost)
+    starts += scan(show_components(context, _unlisted_neighbours(context, components, starts)))
+    starts += [find_best_start(problem, base, component, measured, weights, nuisance) for component in shown.unshown]
     return sorted(starts, key=lambda start: start.cost)
 
 
-def _scan_with_signatures(
-    context: ModelContext,
-    measured: TransferFunctions,
-    base: Fit,
-    response: Response,
-    weights: FloatArray,
-    components: Sequence[Component],
-) -> tuple[list[Start], list[Component]]:
-    """Find the best values of components that have a signature, and list those that have none."""
-    signatures = [component.effect.signature(context, component.location) for component in components]
-    signed = [
-        (component, signature)
-        for component, signature in zip(components, signatures, strict=True)
-        if signature is not None
-    ]
-    starts = scan_signatures(
-        [component for component, _ in signed], [signature for _, signature in signed], response, base.hypothesis.basis,
-        context.layout, measured, weights,
-    )  # fmt: skip
-    return starts, [component for component, signature in zip(components, signatures, strict=True) if signature is None]
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShownComponents:
+    """Components by how they show in the FRFs.
+
+    Parameters
+    ----------
+    signed : tuple of (list of Component, list of Signature)
+        Those that are a dynamic stiffness on a motion.
+    read : tuple of (list of Component, list of Reading)
+        Those that are another motion that a channel reads.
+    unshown : list of Component
+        The others, which are evaluated one by one.
+    """
+
+    signed: tuple[list[Component], list[Signature]]
+    read: tuple[list[Component], list[Reading]]
+    unshown: list[Component]
+
+
+def show_components(context: ModelContext, components: Iterable[Component]) -> ShownComponents:
+    """Sort components by how they show in the FRFs.
+
+    Parameters
+    ----------
+    context : ModelContext
+        Its contour is where signatures are evaluated.
+    components : iterable of Component
+        Effects at their locations.
+
+    Returns
+    -------
+    ShownComponents
+        The same components.
+    """
+    shown = ShownComponents(signed=([], []), read=([], []), unshown=[])
+    for component in components:
+        signature = component.effect.signature(context, component.location)
+        reading = component.effect.reading(context, component.location) if signature is None else None
+        if signature is not None:
+            shown.signed[0].append(component)
+            shown.signed[1].append(signature)
+        elif reading is not None:
+            shown.read[0].append(component)
+            shown.read[1].append(reading)
+        else:
+            shown.unshown.append(component)
+    return shown
 
 
 def _unlisted_neighbours(

@@ -12,14 +12,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
+from frf_ipz.diagnosis.model.motion import Motion
 from frf_ipz.diagnosis.model.response import nuisance_jacobian
-from frf_ipz.diagnosis.search.global_scan import MOTIONS_AT_ONCE, evaluate_receptances, list_components
+from frf_ipz.diagnosis.search.global_scan import (
+    MOTIONS_AT_ONCE,
+    evaluate_receptances,
+    group_readings,
+    list_components,
+    read_elsewhere,
+    show_components,
+)
 from frf_ipz.diagnosis.search.robust_refinement import Start
 from frf_ipz.numerics.least_squares import cholesky_with_prior
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frf_ipz.arrays import ComplexArray, FloatArray
-    from frf_ipz.diagnosis.catalogue.effect import Parameter, Signature
+    from frf_ipz.diagnosis.catalogue.effect import Parameter, Reading, Signature
     from frf_ipz.diagnosis.evidence.fit import Data, Fit
     from frf_ipz.diagnosis.evidence.hypothesis import Component, Hypothesis
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
@@ -72,8 +82,25 @@ class ScoreTest:
 
     def gain_at(self, hypothesis: Hypothesis, values: FloatArray) -> float:
         """Gain in log-likelihood at some values: half the fall of the sum of squares."""
-        misfit = self._misfit(hypothesis, hypothesis.clip_to_searched(np.concatenate([self.base.values, values])))
-        return 0.5 * (self._square(self.misfit, self.misfit) - self._square(misfit, misfit))
+        searched = hypothesis.clip_to_searched(np.concatenate([self.base.values, values]))
+        response = hypothesis.respond(hypothesis.to_physical(searched), self.base.nuisance, self.data.measured.s)
+        return float(self.gains_of(response.values[:, :, None])[0])
+
+    def gains_of(self, values: ComplexArray) -> FloatArray:
+        """Gains in log-likelihood of FRFs instead of those of the base: half the fall of the sum of squares.
+
+        Parameters
+        ----------
+        values : (n_points, n_frfs, n) complex array
+            FRFs with the nuisance of the base.
+
+        Returns
+        -------
+        (n,) array
+            The nuisance is fitted by one step.
+        """
+        misfits = self.data.misfits(values) + (self.columns @ self.whitened_nuisance)[:, None]
+        return np.asarray(0.5 * (self._squares(self.misfit[:, None]) - self._squares(misfits)))
 
     def score_changes(self, changes: ComplexArray) -> tuple[FloatArray, FloatArray]:
         """Find the best sizes of changes, and the gain of each.
@@ -97,15 +124,10 @@ class ScoreTest:
         products = self.misfit @ white - misfit_explained @ explained
         return products / squares, 0.5 * products**2 / squares
 
-    def _misfit(self, hypothesis: Hypothesis, searched: FloatArray) -> FloatArray:
-        """Whitened misfit, as it would be without the nuisance."""
-        data = self.data
-        response = hypothesis.respond(hypothesis.to_physical(searched), self.base.nuisance, data.measured.s)
-        return data.misfit(response) + self.columns @ self.whitened_nuisance
-
-    def _square(self, first: FloatArray, second: FloatArray) -> float:
-        explained = [linalg.solve_triangular(self.factor, self.columns.T @ x, lower=True) for x in (first, second)]
-        return float(first @ second - explained[0] @ explained[1])
+    def _squares(self, misfits: FloatArray) -> FloatArray:
+        """Sum the squares of misfits, (n_data, n), that the nuisance cannot explain."""
+        explained = linalg.solve_triangular(self.factor, self.columns.T @ misfits, lower=True)
+        return np.asarray(np.sum(misfits**2, 0) - np.sum(explained**2, 0))
 
 
 def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> ScoreTest:
@@ -159,20 +181,30 @@ def run_score_test(problem: InferenceProblem, base: Fit) -> list[Start]:
     test = prepare_score_test(problem, base, problem.sparse_data)
     context = replace(problem.context, contour=problem.sparse_data.measured.s)
     components = [component for effect in problem.effects.values() for component in list_components(effect, context)]
-    signatures = [component.effect.signature(context, component.location) for component in components]
-    signed = [
-        (component, signature)
-        for component, signature in zip(components, signatures, strict=True)
-        if signature is not None
-    ]
+    shown = show_components(context, components)
+    signed = list(zip(*shown.signed, strict=True))
     response = base.hypothesis.respond(base.values, base.nuisance, context.contour)
     starts = _score_signatures(test, response, signed)
-    starts += [
-        _score_directly(test, component)
-        for component, signature in zip(components, signatures, strict=True)
-        if signature is None
-    ]
+    starts += _score_readings(test, *shown.read)
+    starts += [_score_directly(test, component) for component in shown.unshown]
     return sorted(starts, key=lambda start: start.cost)
+
+
+def _score_readings(test: ScoreTest, components: Sequence[Component], readings: Sequence[Reading]) -> list[Start]:
+    """Score all channels that read other motions."""
+    hypothesis, base = test.base.hypothesis, test.response
+    local = hypothesis.nuisance_prior.unpack(test.base.nuisance).local
+    starts = []
+    for channel, members in group_readings(readings):
+        motions = [readings[member].motion for member in members]
+        frfs, values = read_elsewhere(base, hypothesis.basis, hypothesis.context.layout, local, channel, motions)
+        all_values = np.repeat(base.values[:, :, None], len(members), 2)
+        all_values[:, frfs] = values
+        starts += [
+            Start(component=components[member], values=np.zeros(0), cost=-gain)
+            for member, gain in zip(members, test.gains_of(all_values).tolist(), strict=True)
+        ]
+    return starts
 
 
 def _score_signatures(test: ScoreTest, response: Response, signed: list[tuple[Component, Signature]]) -> list[Start]:
@@ -181,7 +213,7 @@ def _score_signatures(test: ScoreTest, response: Response, signed: list[tuple[Co
     batch: list[tuple[int, int, ComplexArray]] = []
     for first in range(0, len(signed), MOTIONS_AT_ONCE):
         group = signed[first : first + MOTIONS_AT_ONCE]
-        motions = np.stack([signature.motion for _, signature in group], 1)
+        motions = [Motion.of(signature.motion) for _, signature in group]
         hypothesis = test.base.hypothesis
         layout = hypothesis.context.layout
         across = evaluate_receptances(response, hypothesis.basis, layout, motions, np.zeros(len(group))).across

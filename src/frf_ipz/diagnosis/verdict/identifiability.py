@@ -12,13 +12,14 @@ from frf_ipz.diagnosis.model.response import nuisance_jacobian
 from frf_ipz.numerics.least_squares import cholesky_with_prior
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter
     from frf_ipz.diagnosis.evidence.fit import Fit
     from frf_ipz.diagnosis.evidence.hypothesis import Hypothesis
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
+    from frf_ipz.diagnosis.model.motion import Motion
 
 N_LOCATIONS = 2  # of each effect, spread over the structure
 N_HALVINGS = 5  # halvings of the range
@@ -136,7 +137,7 @@ def find_best_sensor(problem: InferenceProblem, first: Fit, second: Fit) -> str:
     """
     context = problem.context
     dofs = context.moving_dofs[:: -(-len(context.moving_dofs) // MAX_CANDIDATES)]
-    motions = np.stack([context.unit_motion(dof) for dof in dofs], 1)
+    motions = [context.motion(dof) for dof in dofs]
     s = context.contour
     first_frfs, second_frfs = (_receptances(fit, motions, s) for fit in (first, second))
     size = np.sqrt(np.mean(np.abs(first_frfs) ** 2, axis=0))
@@ -154,7 +155,7 @@ def find_best_sensor(problem: InferenceProblem, first: Fit, second: Fit) -> str:
     )
 
 
-def _receptances(fit: Fit, motions: FloatArray, s: ComplexArray) -> ComplexArray:
+def _receptances(fit: Fit, motions: Sequence[Motion], s: ComplexArray) -> ComplexArray:
     response = fit.hypothesis.respond(fit.values, fit.nuisance, s)
-    shapes = motions.T @ fit.hypothesis.basis.vectors @ response.modes.vectors
+    shapes = fit.hypothesis.basis.project_motions(motions) @ response.modes.vectors
     return np.asarray(np.matmul(shapes, response.input_motion))

@@ -18,9 +18,12 @@ from frf_ipz.diagnosis.result import Curves
 from frf_ipz.diagnosis.search.global_scan import evaluate_receptances
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.evidence.fit import Fit
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
+    from frf_ipz.diagnosis.model.motion import Motion
 
 N_SUBBANDS = 6  # subbands, on a logarithmic scale
 DISAGREES = 3.0  # standard deviations
@@ -110,12 +113,12 @@ def localise_mismatch(problem: InferenceProblem, null: Fit) -> dict[str, list[in
     if len(problem.data.measured.labels) < MIN_FRFS:
         return {}
     dofs = problem.context.moving_dofs
-    before, remaining = _compute_misfits(problem, null, np.stack([problem.context.unit_motion(dof) for dof in dofs], 1))
+    before, remaining = _compute_misfits(problem, null, [problem.context.motion(dof) for dof in dofs])
     best = int(np.argmin(remaining))
     return {"nodes": [dofs[best].node]} if remaining[best] < (1 - MIN_EXPLAINED) * before else {}
 
 
-def _compute_misfits(problem: InferenceProblem, null: Fit, motions: FloatArray) -> tuple[float, FloatArray]:
+def _compute_misfits(problem: InferenceProblem, null: Fit, motions: Sequence[Motion]) -> tuple[float, FloatArray]:
     """Compute the robust misfit without and with a free dynamic stiffness on each of some motions."""
     is_on_fit = null.is_nearly_right
     data = problem.sparse_data.measured if is_on_fit else problem.coarse
@@ -124,7 +127,7 @@ def _compute_misfits(problem: InferenceProblem, null: Fit, motions: FloatArray) 
     gains = problem.sparse_data.gains(response) if is_on_fit else 1.0
     weights = compute_weights(data, ERROR)
     misfit = data.values - gains * response.values
-    no_missing_flexibility = np.zeros(motions.shape[1])
+    no_missing_flexibility = np.zeros(len(motions))
     across = evaluate_receptances(
         response, null.hypothesis.basis, problem.context.layout, motions, no_missing_flexibility
     ).across

@@ -66,7 +66,7 @@ class LocalForce(ViscoelasticJoint):
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Attach its dynamic stiffness; no matrices have it."""
-        motion, middle = motion_at(context, location)[:, None], _middle(context)
+        motion, middle = motion_at(context, location).dense(len(context.model.all_dofs))[:, None], _middle(context)
         zero = np.zeros((1, 1))
 
         def change(values: FloatArray) -> Change:

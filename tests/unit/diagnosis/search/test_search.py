@@ -11,7 +11,8 @@ from diagnosed import BAND_HZ, beam, labels, measured, observed
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.evidence.hypothesis import Component
-from frf_ipz.diagnosis.evidence.inference_problem import pose_problem
+from frf_ipz.diagnosis.evidence.inference_problem import compute_weights, pose_problem
+from frf_ipz.diagnosis.evidence.map_fit import fit_map
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.measured.transfer_functions import FAINT, find_faint_frfs, raise_faint_sizes
 from frf_ipz.diagnosis.model.basis import solve_changed_modes
@@ -21,6 +22,7 @@ from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search import component_search as search
 from frf_ipz.diagnosis.search import neighbourhood_search as climb
 from frf_ipz.diagnosis.search.component_search import fit_null_model, group_by_effect
+from frf_ipz.diagnosis.search.global_scan import SCAN_ERROR, find_best_start, scan_globally
 from frf_ipz.diagnosis.search.robust_refinement import Start
 from frf_ipz.diagnosis.verdict.findings import RankedEffect, make_finding, rank_effects
 from frf_ipz.diagnosis.verdict.goodness import assess_goodness
@@ -132,6 +134,21 @@ def test_a_frequency_beyond_the_tolerances_is_not_explained(nominal):
     assert assess_goodness(problem, inside).is_good
     assert not assess_goodness(problem, beyond).is_good
     assert assess_goodness(problem, beyond).frequency_deviation == pytest.approx(2.6)
+
+
+def test_all_wrong_places_of_a_sensor_in_one_product_are_those_that_are_evaluated_one_by_one(nominal):
+    """What a scan costs a sensor elsewhere is what that hypothesis's own FRFs cost."""
+    problem = problem_of(nominal, measured(with_point_masses(nominal, {12: 0.02})), ("sensor_misplaced",))
+    null = problem.make_hypothesis(())
+    base = fit_map(null, problem.rough_data, np.zeros(0), iterations=0)
+    starts = scan_globally(problem, base)
+    assert {start.component.location.key[0] for start in starts} == {
+        channel for channel, _ in problem.context.layout.outputs
+    }
+    weights, nuisance = compute_weights(problem.coarse, SCAN_ERROR), np.zeros(problem.nuisance_prior.size)
+    for start in starts[::5]:
+        alone = find_best_start(problem, base, start.component, problem.coarse, weights, nuisance)
+        assert start.cost == pytest.approx(alone.cost, rel=DIGITS)
 
 
 def test_three_effects_are_found_at_once(nominal):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,8 @@ from frf_ipz.diagnosis.catalogue.effect import (
     list_node_locations,
 )
 from frf_ipz.diagnosis.model.change import Attachment, Change
+from frf_ipz.diagnosis.model.motion import Motion
+from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -56,7 +59,7 @@ class AttachedResonator(Effect):
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Attach its dynamic stiffness."""
-        motion = _motion(context, location)[:, None]
+        motion = _motion(context, location).dense(len(context.model.all_dofs))[:, None]
 
         def change(values: np.ndarray) -> Change:
             mass, frequency_hz, ratio = values
@@ -73,15 +76,8 @@ class AttachedResonator(Effect):
 
     def signature(self, context: ModelContext, location: Location) -> Signature:
         """All frequencies and some damping ratios."""
-        low, high = context.band_hz
-        count = int(np.log(1.3 * high / (0.7 * low)) / np.log(FREQUENCY_STEP)) + 1
-        pairs = list(product(np.geomspace(0.7 * low, 1.3 * high, count), START_RATIOS))
-        return Signature(
-            motion=_motion(context, location),
-            shapes=np.array([dynamic_mass(context.contour, frequency, ratio) for frequency, ratio in pairs]),
-            values=np.array([(1.0, frequency, ratio) for frequency, ratio in pairs]),
-            amplitudes=np.geomspace(3e-4, 0.3, 9) * context.mass_kg,
-        )
+        shapes, values, amplitudes = _make_shapes(context)
+        return Signature(motion=_motion(context, location), shapes=shapes, values=values, amplitudes=amplitudes)
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside."""
@@ -112,6 +108,18 @@ class AttachedResonator(Effect):
         )
 
 
+@lru_cache(maxsize=4)  # the same at all locations
+def _make_shapes(context: ModelContext) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    low, high = context.band_hz
+    count = int(np.log(1.3 * high / (0.7 * low)) / np.log(FREQUENCY_STEP)) + 1
+    pairs = list(product(np.geomspace(0.7 * low, 1.3 * high, count), START_RATIOS))
+    return (
+        np.array([dynamic_mass(context.contour, frequency, ratio) for frequency, ratio in pairs]),
+        np.array([(1.0, frequency, ratio) for frequency, ratio in pairs]),
+        np.geomspace(3e-4, 0.3, 9) * context.mass_kg,
+    )
+
+
 def dynamic_mass(s: ComplexArray, frequency_hz: float, ratio: float) -> ComplexArray:
     """Dynamic stiffness of a resonator of unit mass: s^2 (k + c s) / (k + c s + s^2).
 
@@ -132,5 +140,6 @@ def dynamic_mass(s: ComplexArray, frequency_hz: float, ratio: float) -> ComplexA
     return np.asarray(s**2 * spring / (s**2 + spring))
 
 
-def _motion(context: ModelContext, location: Location) -> np.ndarray:
-    return context.unit_motion(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key))
+def _motion(context: ModelContext, location: Location) -> Motion:
+    node, direction = location.key
+    return context.motion(Dof(int(str(node)), str(direction)))

@@ -7,12 +7,13 @@ from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter, Signature
 from frf_ipz.diagnosis.catalogue.effects.grounded_spring import floating, is_floating
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.diagnosis.model.motion import Motion, make_unit_stiffness
+from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -46,8 +47,7 @@ class CouplingSpring(Effect):
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Add it to the matrix."""
-        motion = sparse.csr_array(_motion(context, location)[:, None])
-        unit = sparse.csr_array(motion @ motion.T)
+        unit = make_unit_stiffness(_motion(context, location), len(context.model.all_dofs))
         floats = is_floating(location)
         return lambda values: Change(stiffness=values[0] * unit, floating=floats)
 
@@ -115,7 +115,7 @@ def _is_new(context: ModelContext, first: int, second: int) -> bool:
     return not any(part.kind == "spring" and {first, second} == set(part.nodes) for part in model.parts)
 
 
-def _motion(context: ModelContext, location: Location) -> np.ndarray:
+def _motion(context: ModelContext, location: Location) -> Motion:
     first, second, direction = location.key[:3]
-    ends = {dof.node: dof for dof in context.moving_dofs if dof.direction == direction}
-    return context.unit_motion(ends[int(str(second))]) - context.unit_motion(ends[int(str(first))])
+    ends = [context.motion(Dof(int(str(node)), str(direction))) for node in (second, first)]
+    return ends[0] - ends[1]

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from frf_ipz.diagnosis.catalogue.effect import (
     Builder,
@@ -18,6 +17,8 @@ from frf_ipz.diagnosis.catalogue.effect import (
     list_node_locations,
 )
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.diagnosis.model.motion import Motion, make_unit_stiffness
+from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -46,7 +47,7 @@ class GroundedSpring(Effect):
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Add it to the diagonal."""
-        unit = sparse.csr_array(sparse.diags_array(_motion(context, location)))
+        unit = make_unit_stiffness(_motion(context, location), len(context.model.all_dofs))
         floats = is_floating(location)
         return lambda values: Change(stiffness=values[0] * unit, floating=floats)
 
@@ -115,5 +116,6 @@ def is_floating(location: Location) -> bool:
     return FLOATING in location.key
 
 
-def _motion(context: ModelContext, location: Location) -> np.ndarray:
-    return context.unit_motion(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key[:2]))
+def _motion(context: ModelContext, location: Location) -> Motion:
+    node, direction = location.key[:2]
+    return context.motion(Dof(int(str(node)), str(direction)))

@@ -18,6 +18,8 @@ from frf_ipz.diagnosis.catalogue.effect import (
     list_node_locations,
 )
 from frf_ipz.diagnosis.model.change import Attachment, Change
+from frf_ipz.diagnosis.model.motion import Motion
+from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -44,7 +46,7 @@ class LocalDamper(Effect):
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Attach it."""
-        motion = _motion(context, location)[:, None]
+        motion = _motion(context, location).dense(len(context.model.all_dofs))[:, None]
         none = np.zeros((1, 1))
 
         def change(values: FloatArray) -> Change:
@@ -72,5 +74,6 @@ class LocalDamper(Effect):
         )
 
 
-def _motion(context: ModelContext, location: Location) -> np.ndarray:
-    return context.unit_motion(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key))
+def _motion(context: ModelContext, location: Location) -> Motion:
+    node, direction = location.key
+    return context.motion(Dof(int(str(node)), str(direction)))

@@ -10,6 +10,7 @@ import numpy as np
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter, Signature
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.diagnosis.model.motion import Motion
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.changes import part_matrices
 
@@ -130,22 +131,19 @@ def _name_part(context: ModelContext, location: Location) -> str:
     return f"{what[:-3] if first == last else what[:-4]} (x = {ends[0]:.3f} to {ends[1]:.3f} m) {what.split()[-1]}"
 
 
-def _curvature(context: ModelContext, location: Location) -> tuple[FloatArray, float]:
+def _curvature(context: ModelContext, location: Location) -> tuple[Motion, float]:
     """Rotation of a segment's right end against its left one, and the bending stiffness against that."""
     first, last = int(str(location.key[1])), int(str(location.key[2]))
     model = context.model
-    motion = np.zeros(len(model.all_dofs))
-    motion[model.full_indices[Dof(last + 1, "ry")]], motion[model.full_indices[Dof(first, "ry")]] = 1.0, -1.0
+    rotations = tuple(model.full_index(Dof(node, "ry")) for node in (last + 1, first))
     parts = {part.name: part for part in model.parts if part.kind == "element"}
     flexibility = 0.0
     for name in _names(location):
         bent = np.array([0.0, -0.5, 0.0, 0.5])
         flexibility += 1 / float(bent @ parts[name].stiffness @ bent)
-    return motion, 1 / flexibility
+    return Motion(rows=rotations, weights=(1.0, -1.0)), 1 / flexibility
 
 
-def _extension(context: ModelContext, location: Location) -> tuple[FloatArray, float]:
+def _extension(context: ModelContext, location: Location) -> tuple[Motion, float]:
     part = next(part for part in context.model.parts if part.kind == "spring" and part.name == location.key[1])
-    motion = np.zeros(len(context.model.all_dofs))
-    motion[part.indices] = (-1.0, 1.0)
-    return motion, float(part.stiffness[1, 1])
+    return Motion(rows=tuple(part.indices.tolist()), weights=(-1.0, 1.0)), float(part.stiffness[1, 1])

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter, Reading
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.diagnosis.model.motion import Motion
 from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
@@ -45,6 +46,13 @@ class SensorMisplaced(Effect):
         """Do the same for any structure."""
         change = Change(moved={str(location.key[0]): int(str(location.key[1]))})
         return lambda _: change
+
+    def reading(self, context: ModelContext, location: Location) -> Reading:
+        """Read the same direction at the other node."""
+        channel, node = str(location.key[0]), int(str(location.key[1]))
+        dof = _nominal_dof(context, channel)
+        row = context.model.full_index(Dof(node, dof.direction))
+        return Reading(channel=channel, motion=Motion(rows=(row,), weights=(float(dof.sign),)))
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside."""

@@ -18,6 +18,7 @@ from frf_ipz.diagnosis.catalogue.effect import (
     list_node_locations,
 )
 from frf_ipz.diagnosis.model.change import Attachment, Change
+from frf_ipz.diagnosis.model.motion import Motion
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.kinds.beam import BeamFile
 
@@ -61,7 +62,7 @@ class ViscoelasticJoint(Effect):
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Attach its dynamic stiffness."""
-        motion = motion_at(context, location)[:, None]
+        motion = motion_at(context, location).dense(len(context.model.all_dofs))[:, None]
         light = 1 / (LIGHT * 2 * np.pi * context.band_hz[1]) ** 2
 
         def change(values: FloatArray) -> Change:
@@ -154,8 +155,8 @@ def _ends(context: ModelContext) -> list[Location]:
     ]
 
 
-def motion_at(context: ModelContext, location: Location) -> FloatArray:
-    """Weights of all DOFs in the motion of a joint.
+def motion_at(context: ModelContext, location: Location) -> Motion:
+    """Give the motion of a joint.
 
     Parameters
     ----------
@@ -166,15 +167,13 @@ def motion_at(context: ModelContext, location: Location) -> FloatArray:
 
     Returns
     -------
-    (n_all,) array
+    Motion
         The motion of a node, the extension of a spring, the rotation of an end.
     """
     kind = location.key[0]
     if kind == "node":
-        return context.unit_motion(next(d for d in context.moving_dofs if (d.node, d.direction) == location.key[1:]))
+        return context.motion(Dof(int(str(location.key[1])), str(location.key[2])))
     if kind == "end":
-        return context.unit_motion(Dof(int(str(location.key[2])), "ry"))
+        return context.motion(Dof(int(str(location.key[2])), "ry"))
     part = next(part for part in context.model.parts if part.kind == "spring" and part.name == location.key[1])
-    motion = np.zeros(len(context.model.all_dofs))
-    motion[part.indices] = (-1.0, 1.0)
-    return motion
+    return Motion(rows=tuple(part.indices.tolist()), weights=(-1.0, 1.0))
