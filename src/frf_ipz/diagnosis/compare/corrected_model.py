@@ -41,8 +41,7 @@ def correct_model(hypothesis: Hypothesis, nuisance: FloatArray) -> StructuralMod
         With the fitted modes; one below the band whose stiffness would be negative gets little of it.
     """
     values = nuisance.copy()
-    sizes = hypothesis.nuisance_prior.sizes
-    values[sum(sizes[:3]) : sum(sizes[:4])] = 0.0  # suspension
+    values[hypothesis.nuisance_prior.blocks.suspension] = 0.0
     modes = hypothesis.modes(np.zeros(0), values)
     model, m = hypothesis.context.model, hypothesis.nuisance_prior.n_modes
     plain = modes.vectors[:, :m] @ linalg.inv(modes.rotation)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import BoolArray, FloatArray, IntArray
+from frf_ipz.arrays import BoolArray, FloatArray
 from frf_ipz.diagnosis.compare.corrected_model import correct_model
 from frf_ipz.diagnosis.compare.states import MachineState
 from frf_ipz.diagnosis.compare.unexplained_change import UnexplainedPart, discount_unexplained, find_unexplained_part
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.hypothesis import Hypothesis
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
     from frf_ipz.diagnosis.model.modes import Modes
+    from frf_ipz.diagnosis.model.nuisance import NuisancePrior
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.structure import StructuralModel
 
@@ -207,12 +208,7 @@ def predict_unchanged_model(
     no_nuisance = np.zeros(problem.nuisance_prior.size)
     if len(no_nuisance) != len(learnt.correction):
         raise InputError("the state after has other channels or another number of modes in the band than those before")
-    signs = _signs(
-        null.modes(np.zeros(0), no_nuisance),
-        problem.nuisance_prior.n_modes,
-        null.nuisance_prior.pairs,
-        len(no_nuisance),
-    )
+    signs = _signs(null.modes(np.zeros(0), no_nuisance), null.nuisance_prior)
     return correct_model(null, learnt.correction * signs)
 
 
@@ -277,13 +273,14 @@ def find_mode_signs(fit: Fit) -> FloatArray:
     """
     nuisance_prior = fit.hypothesis.nuisance_prior
     modes = fit.hypothesis.modes(fit.values, np.zeros(nuisance_prior.size))
-    return _signs(modes, nuisance_prior.n_modes, nuisance_prior.pairs, nuisance_prior.size)
+    return _signs(modes, nuisance_prior)
 
 
-def _signs(modes: Modes, n_modes: int, pairs: tuple[IntArray, IntArray], size: int) -> FloatArray:
-    shape_signs = np.where(modes.outputs[0, :n_modes] < 0, -1.0, 1.0)
-    signs, between = np.ones(size), shape_signs[pairs[0]] * shape_signs[pairs[1]]
-    signs[: 2 * len(between)] = np.concatenate([between, between])
+def _signs(modes: Modes, nuisance_prior: NuisancePrior) -> FloatArray:
+    shape_signs = np.where(modes.outputs[0, : nuisance_prior.n_modes] < 0, -1.0, 1.0)
+    rows, columns = nuisance_prior.pairs
+    signs, blocks = np.ones(nuisance_prior.size), nuisance_prior.blocks
+    signs[blocks.stiffness] = signs[blocks.mass] = shape_signs[rows] * shape_signs[columns]
     return signs
 
 

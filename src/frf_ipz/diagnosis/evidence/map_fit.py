@@ -241,10 +241,9 @@ def _scatter_of_squares(modes: Modes, nuisance_prior: NuisancePrior) -> FloatArr
     kappa = turned * (omega[i] * omega[j] * nuisance_prior.kappa_std[i, j])[:, None]
     mu = -turned * modes.squares[:m] * nuisance_prior.mu_std[i, j][:, None]
     suspension = modes.rotation[: nuisance_prior.n_rigid] ** 2 * nuisance_prior.suspension_std
-    derivatives = np.zeros((m, nuisance_prior.size))
-    size = len(i)
-    derivatives[:, :size], derivatives[:, size : 2 * size] = kappa.T, mu.T
-    derivatives[:, 2 * size + m : 2 * size + m + nuisance_prior.n_rigid] = suspension.T
+    derivatives, blocks = np.zeros((m, nuisance_prior.size)), nuisance_prior.blocks
+    derivatives[:, blocks.stiffness], derivatives[:, blocks.mass] = kappa.T, mu.T
+    derivatives[:, blocks.suspension] = suspension.T
     return derivatives
 
 

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import accumulate, pairwise
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -87,6 +87,42 @@ class NuisanceValues:
     gains: FloatArray
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NuisanceBlocks:
+    """Where each kind of nuisance parameter stands among all of them.
+
+    Parameters
+    ----------
+    stiffness, mass : slice
+        Upper triangles of kappa and mu, row by row.
+    damping : slice
+        Relative errors of damping ratios.
+    suspension : slice
+        Squared frequencies of rigid-body modes.
+    output_shifts, input_shifts : slice
+        Distances of sensors and excited points from their nominal positions; of each, along one axis after the other.
+    local : slice
+        Errors of the local compliance of the FRFs.
+    gains : slice
+        Errors of the channels' gains.
+    """
+
+    stiffness: slice
+    mass: slice
+    damping: slice
+    suspension: slice
+    output_shifts: slice
+    input_shifts: slice
+    local: slice
+    gains: slice
+
+    @classmethod
+    def in_order(cls, **sizes: int) -> NuisanceBlocks:
+        """Place blocks of some sizes one after the other."""
+        ends = accumulate(sizes.values())
+        return cls(**{name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)})
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NuisancePrior:
     """Prior of the nuisance parameters, each in units of its standard deviation.
@@ -138,45 +174,49 @@ class NuisancePrior:
         return _triangle(self.n_modes)
 
     @property
-    def sizes(self) -> tuple[int, ...]:
-        """Numbers of parameters: kappa, mu, damping, suspension, shifts of sensors and excited points, local, gains."""
-        n_pairs = self.n_modes * (self.n_modes + 1) // 2
-        shifts = len(self.axes)
-        return (
-            *(n_pairs, n_pairs, self.n_modes, self.n_rigid),
-            *(shifts * self.n_outputs, shifts * self.n_inputs, len(self.local_std), self.n_channels),
+    def blocks(self) -> NuisanceBlocks:
+        """Where each kind of parameter stands."""
+        n_pairs, n_axes = self.n_modes * (self.n_modes + 1) // 2, len(self.axes)
+        return NuisanceBlocks.in_order(
+            stiffness=n_pairs,
+            mass=n_pairs,
+            damping=self.n_modes,
+            suspension=self.n_rigid,
+            output_shifts=n_axes * self.n_outputs,
+            input_shifts=n_axes * self.n_inputs,
+            local=len(self.local_std),
+            gains=self.n_channels,
         )
 
     @property
     def size(self) -> int:
         """Number of all parameters."""
-        return sum(self.sizes)
+        return int(self.blocks.gains.stop)
 
     @property
     def frequency_indices(self) -> IntArray:
         """Where the relative errors of the squared frequencies, kappa_ii, stand among the parameters."""
         rows, columns = self.pairs
-        return np.flatnonzero(rows == columns).astype(np.int64)
+        return np.asarray(_indices(self.blocks.stiffness)[rows == columns], np.int64)
 
     @property
     def damping_indices(self) -> IntArray:
         """Where the relative errors of the damping ratios stand among the parameters."""
-        return np.arange(self.n_modes) + 2 * self.sizes[0]
+        return _indices(self.blocks.damping)
 
     @property
     def gain_indices(self) -> IntArray:
         """Where the gains stand among the parameters."""
-        return np.arange(self.size - self.n_channels, self.size)
+        return _indices(self.blocks.gains)
 
     @property
     def is_bounded(self) -> BoolArray:
         """Which parameters a tolerance bounds, (size,) array: frequencies, damping, positions and gains."""
-        rows, columns = self.pairs
-        is_diagonal = (rows == columns) & self.is_stated[rows]
-        n_shifts = len(self.axes) * (self.n_outputs + self.n_inputs)
-        suspension, local = np.zeros(self.n_rigid, bool), np.zeros(len(self.local_std), bool)
-        shifts, gains = np.ones(n_shifts, bool), np.ones(self.n_channels, bool)
-        return np.concatenate([is_diagonal, is_diagonal, self.is_stated, suspension, shifts, local, gains])
+        (rows, columns), blocks, is_bounded = self.pairs, self.blocks, np.zeros(self.size, bool)
+        is_bounded[blocks.stiffness] = is_bounded[blocks.mass] = (rows == columns) & self.is_stated[rows]
+        is_bounded[blocks.damping] = self.is_stated
+        is_bounded[blocks.output_shifts] = is_bounded[blocks.input_shifts] = is_bounded[blocks.gains] = True
+        return is_bounded
 
     def scaled_by(self, part: float) -> NuisancePrior:
         """Give the same with a part of the tolerances of stiffness, mass and frequencies.
@@ -208,8 +248,10 @@ class NuisancePrior:
         (size,) array
             Parameters in the other standard deviations.
         """
-        n_fields = sum(self.sizes[:2])
-        return np.concatenate([values[:n_fields] / part, values[n_fields:]])
+        rescaled = values.copy()
+        for fields in (self.blocks.stiffness, self.blocks.mass):
+            rescaled[fields] /= part
+        return rescaled
 
     def whiten(self, values: FloatArray, *, is_bounded: bool = True) -> tuple[FloatArray, FloatArray]:
         """Transform parameters so that the prior's cost is half their sum of squares.
@@ -248,17 +290,16 @@ class NuisancePrior:
         NuisanceValues
             The values.
         """
-        ends = list(accumulate(self.sizes))
-        parts = [values[start:end] for start, end in pairwise((0, *ends))]
+        blocks, n_axes = self.blocks, len(self.axes)
         return NuisanceValues(
-            kappa=self._symmetric(parts[0]) * self.kappa_std,
-            mu=self._symmetric(parts[1]) * self.mu_std,
-            damping=np.maximum(parts[2] * self.damping_std, -0.95),
-            suspension=parts[3] * self.suspension_std,
-            output_shift=parts[4].reshape(self.n_outputs, len(self.axes)) * self.shift_std,
-            input_shift=parts[5].reshape(self.n_inputs, len(self.axes)) * self.shift_std,
-            local=self.local_std * parts[6],
-            gains=np.clip(parts[7] * self.gain_std, -MAX_GAIN, MAX_GAIN),
+            kappa=self._symmetric(values[blocks.stiffness]) * self.kappa_std,
+            mu=self._symmetric(values[blocks.mass]) * self.mu_std,
+            damping=np.maximum(values[blocks.damping] * self.damping_std, -0.95),
+            suspension=values[blocks.suspension] * self.suspension_std,
+            output_shift=values[blocks.output_shifts].reshape(self.n_outputs, n_axes) * self.shift_std,
+            input_shift=values[blocks.input_shifts].reshape(self.n_inputs, n_axes) * self.shift_std,
+            local=self.local_std * values[blocks.local],
+            gains=np.clip(values[blocks.gains] * self.gain_std, -MAX_GAIN, MAX_GAIN),
         )
 
     def _symmetric(self, triangle: FloatArray) -> FloatArray:
@@ -266,6 +307,10 @@ class NuisancePrior:
         matrix = np.zeros((self.n_modes, self.n_modes))
         matrix[rows, columns] = matrix[columns, rows] = triangle
         return matrix
+
+
+def _indices(block: slice) -> IntArray:
+    return np.arange(block.start, block.stop, dtype=np.int64)
 
 
 @cache

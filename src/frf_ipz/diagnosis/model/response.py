@@ -187,19 +187,20 @@ def nuisance_jacobian(response: Response, nuisance_prior: NuisancePrior, layout:
     damping = 2 * modes.stated_ratio[:m] * np.sqrt(np.abs(modes.squares[:m])) * nuisance_prior.damping_std
     rigid = slice(0, nuisance_prior.n_rigid)
     changed = -response.chain[:, :, None] * scattered_outputs * scattered_inputs
-    parts = [
-        products * (omega[i] * omega[j] * nuisance_prior.kappa_std[i, j]),
-        products * nuisance_prior.mu_std[i, j] * (s**2)[:, None, None],
-        changed * damping * s[:, None, None],
-        -response.chain[:, :, None] * outputs[:, :, rigid] * inputs[:, :, rigid] * nuisance_prior.suspension_std,
-        *(
-            np.moveaxis(part, 1, 2) * response.chain[:, :, None]
-            for part in _shift_jacobians(response, nuisance_prior, layout)
-        ),
-        response.chain[:, :, None] * np.diag(nuisance_prior.local_std),
-        response.values[:, :, None] * (layout.gain_signs * nuisance_prior.gain_std),
-    ]
-    return np.concatenate(parts, axis=2)
+    chain, blocks = response.chain[:, :, None], nuisance_prior.blocks
+    jacobian = np.empty((*response.values.shape, nuisance_prior.size), np.complex128)
+    jacobian[:, :, blocks.stiffness] = products * (omega[i] * omega[j] * nuisance_prior.kappa_std[i, j])
+    jacobian[:, :, blocks.mass] = products * nuisance_prior.mu_std[i, j] * (s**2)[:, None, None]
+    jacobian[:, :, blocks.damping] = changed * damping * s[:, None, None]
+    jacobian[:, :, blocks.suspension] = (
+        -chain * outputs[:, :, rigid] * inputs[:, :, rigid] * nuisance_prior.suspension_std
+    )
+    shifts = _shift_jacobians(response, nuisance_prior, layout)
+    for block, shift in zip((blocks.output_shifts, blocks.input_shifts), shifts, strict=True):
+        jacobian[:, :, block] = np.moveaxis(shift, 1, 2) * chain
+    jacobian[:, :, blocks.local] = chain * np.diag(nuisance_prior.local_std)
+    jacobian[:, :, blocks.gains] = response.values[:, :, None] * (layout.gain_signs * nuisance_prior.gain_std)
+    return jacobian
 
 
 def _shift_jacobians(response: Response, nuisance_prior: NuisancePrior, layout: Layout) -> list[ComplexArray]:

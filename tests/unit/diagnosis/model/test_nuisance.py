@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from frf_ipz import read_model, solve_modes
 from frf_ipz.diagnosis.model.basis import make_basis
 from frf_ipz.diagnosis.model.layout import make_layout
-from frf_ipz.diagnosis.model.nuisance import UNIFORM_STD, make_nuisance_prior
+from frf_ipz.diagnosis.model.nuisance import UNIFORM_STD, NuisanceBlocks, make_nuisance_prior
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel, FrfQuantity
@@ -66,3 +66,11 @@ def test_modes_that_shear_brings_into_the_band_scatter(tmp_path, thickness_m, br
     n_modes = nuisance_prior_of(model, top_hz).n_modes
     assert n_modes >= below
     assert brings or n_modes == twice
+
+
+def test_each_parameter_stands_in_one_block():
+    blocks = NuisanceBlocks.in_order(
+        stiffness=3, mass=3, damping=2, suspension=1, output_shifts=4, input_shifts=2, local=2, gains=3
+    )
+    in_turn = np.concatenate([np.arange(20)[getattr(blocks, name)] for name in NuisanceBlocks.__dataclass_fields__])
+    assert in_turn.tolist() == list(range(20))
