@@ -12,7 +12,17 @@ import numpy as np
 import pandas as pd
 
 from frf_ipz.diagnosis.measured.levels import COLUMNS, LevelDependence
-from frf_ipz.diagnosis.result import Ambiguity, Curves, DataCheck, Diagnosis, Estimate, Finding, LawInTime, Misfit
+from frf_ipz.diagnosis.result import (
+    Ambiguity,
+    Curves,
+    DataCheck,
+    Diagnosis,
+    DiagnosisVerdict,
+    Estimate,
+    Finding,
+    LawInTime,
+    Misfit,
+)
 from frf_ipz.dofs import Dof
 from frf_ipz.export.state_space import make_state_space
 from frf_ipz.fe.reduction.options import ReduceOptions
@@ -331,7 +341,7 @@ def synthetic_diagnosis(labels, nodes):
         statement="The sensor's sign is flipped.",
     )
     return Diagnosis(
-        verdict="explained",
+        verdict=DiagnosisVerdict.EXPLAINED,
         findings=(mass, gain),
         alternatives=(replace(mass, effect="local_stiffness", log_evidence_gain=3.0, probability=0.01),),
         mismatch_hz=frequency[:5],

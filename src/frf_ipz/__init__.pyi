@@ -27,6 +27,7 @@ from .diagnosis.result import Ambiguity as Ambiguity
 from .diagnosis.result import Curves as Curves
 from .diagnosis.result import DataCheck as DataCheck
 from .diagnosis.result import Diagnosis as Diagnosis
+from .diagnosis.result import DiagnosisVerdict as DiagnosisVerdict
 from .diagnosis.result import Estimate as Estimate
 from .diagnosis.result import Finding as Finding
 from .diagnosis.result import LawInTime as LawInTime

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,27 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.display import Concise, Drawn, Tabulated
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel
+
+
+class DiagnosisVerdict(StrEnum):
+    """What a diagnosis concludes; each is its text.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.DiagnosisVerdict.EXPLAINED == "explained"
+    True
+    """
+
+    CONSISTENT = "consistent"
+    """Nothing is missing beyond noise and tolerances."""
+    EXPLAINED = "explained"
+    """What was found explains the measurement."""
+    UNEXPLAINED = "unexplained"
+    """Something is missing that nothing known explains."""
+
+    def __repr__(self) -> str:
+        return repr(self.value)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -544,7 +566,7 @@ class Diagnosis(Tabulated, Drawn):
 
     Parameters
     ----------
-    verdict : str
+    verdict : DiagnosisVerdict
         ``consistent``, ``explained`` or ``unexplained``.
     findings : tuple of Finding
         What is missing, the best supported first; with ``unexplained``, the part that is explained.
@@ -613,7 +635,7 @@ class Diagnosis(Tabulated, Drawn):
     [('added_mass', {'nodes': [3]})]
     """
 
-    verdict: str
+    verdict: DiagnosisVerdict
     findings: tuple[Finding, ...]
     alternatives: tuple[Finding, ...]
     mismatch_hz: FloatArray
@@ -637,6 +659,9 @@ class Diagnosis(Tabulated, Drawn):
     statements: tuple[str, ...] = ()
     not_searched: str = ""
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "verdict", DiagnosisVerdict(self.verdict))  # its text is taken too
+
     @property
     def is_complete(self) -> bool:
         """False where the time did not suffice for the whole search."""
@@ -646,7 +671,7 @@ class Diagnosis(Tabulated, Drawn):
     def is_explained(self) -> bool:
         """True where nothing remains that the findings and the measured damping do not explain."""
         is_damping_only = bool(self.statements) and not self.unexplained_part
-        return self.verdict != "unexplained" or is_damping_only
+        return self.verdict is not DiagnosisVerdict.UNEXPLAINED or is_damping_only
 
     def __repr__(self) -> str:
         effects = ", ".join(finding.effect for finding in self.findings) or "no finding"
@@ -661,7 +686,7 @@ class Diagnosis(Tabulated, Drawn):
             Plain values.
         """
         return {
-            "verdict": self.verdict,
+            "verdict": self.verdict.value,
             "statement": self.statement,
             "statements": list(self.statements),
             "complete": self.is_complete,

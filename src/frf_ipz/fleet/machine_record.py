@@ -143,7 +143,7 @@ def describe_results(machine: str, results: Results) -> MachineRecord:
         poles=None if fit is None else _poles(fit, pairs),
         zeros=None if fit is None else _zeros(fit, pairs),
         parameters={} if updated is None else _parameters(updated),
-        verdict="" if diagnosis is None else diagnosis.verdict,
+        verdict="" if diagnosis is None else diagnosis.verdict.value,
         assessment="" if assessment is None else assessment.verdict.value,
         is_searched=diagnosis is not None and diagnosis.is_complete,
         findings=() if diagnosis is None else tuple(each for each in diagnosis.findings if each.is_significant),

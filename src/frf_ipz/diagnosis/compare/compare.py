@@ -17,8 +17,7 @@ from frf_ipz.diagnosis.compare.unexplained_change import discount_unexplained
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.result import Diagnosis
-from frf_ipz.diagnosis.verdict.decision import CONSISTENT
+from frf_ipz.diagnosis.result import Diagnosis, DiagnosisVerdict
 from frf_ipz.display import Concise
 from frf_ipz.errors import InputError
 from frf_ipz.progress import silent
@@ -75,7 +74,7 @@ class Comparison(Concise):
     @property
     def is_changed(self) -> bool:
         """True where more differs than from test to test."""
-        return self.diagnosis.verdict != CONSISTENT
+        return self.diagnosis.verdict is not DiagnosisVerdict.CONSISTENT
 
     @property
     def changes(self) -> tuple[Finding, ...]:

@@ -40,7 +40,7 @@ from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
 from frf_ipz.diagnosis.nonlinear.model.modal_model import make_modal_model
 from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import assess_agreement
 from frf_ipz.diagnosis.nonlinear.predictive_check import compare_misfits, describe_working_range, relative_misfit
-from frf_ipz.diagnosis.result import describe_location_set
+from frf_ipz.diagnosis.result import DiagnosisVerdict, describe_location_set
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
@@ -57,7 +57,6 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
     from frf_ipz.structure import StructuralModel
 
-LINEAR, EXPLAINED, UNEXPLAINED = "linear", "explained", "unexplained"
 DISAGREE = "Weak and strong records disagree"
 FIRST_PERIODS = 40.0  # of the top of the band: length of segments from which a rough start leads to a strong law
 MIN_RECORDS = 3  # of an excited point: one of them is held out
@@ -90,8 +89,9 @@ class LawSearch:
 
     Parameters
     ----------
-    verdict : str
-        ``linear``, ``explained`` (by the first finding) or ``unexplained`` (not linear, and no law explains it).
+    verdict : DiagnosisVerdict
+        ``consistent`` (with one linear system), ``explained`` (by the first finding) or ``unexplained`` (not linear,
+        and no law explains it).
     linearity : Linearity
         Test of the records without a model.
     findings : tuple of Finding
@@ -118,7 +118,7 @@ class LawSearch:
         The best law in time, for a figure.
     """
 
-    verdict: str
+    verdict: DiagnosisVerdict
     linearity: Linearity
     findings: tuple[Finding, ...] = ()
     nonlinear_evidence: float = np.nan
@@ -137,7 +137,7 @@ class LawSearch:
     @property
     def is_nonlinear(self) -> bool:
         """No linear system explains the records."""
-        return self.verdict != LINEAR
+        return self.verdict is not DiagnosisVerdict.CONSISTENT
 
     @property
     def nuisance_chi2(self) -> float:
@@ -192,11 +192,15 @@ def search_laws(
     linearity = assess_linearity(observations) if linearity is None else linearity
     if not linearity.is_nonlinear:
         return LawSearch(
-            verdict=LINEAR, linearity=linearity, statement="Records of all levels agree with one linear system."
+            verdict=DiagnosisVerdict.CONSISTENT,
+            linearity=linearity,
+            statement="Records of all levels agree with one linear system.",
         )
     laws = tuple(select_laws(options) if laws is None else laws)
     if not laws:
-        return LawSearch(verdict=UNEXPLAINED, linearity=linearity, statement=f"{DISAGREE}; no law was searched for.")
+        return LawSearch(
+            verdict=DiagnosisVerdict.UNEXPLAINED, linearity=linearity, statement=f"{DISAGREE}; no law was searched for."
+        )
     progress(0.1, "searching for a nonlinear law")
     training, held_out = _hold_out(observations)
     modal_model, noise = make_modal_model(model, observations), read_noise(observations)
@@ -204,11 +208,13 @@ def search_laws(
         training=training, held_out=held_out, modal_model=modal_model, noise=noise, options=options, deadline=deadline
     )
     state = _search_catalogue(data, linearity, laws)
-    if state.result.fit is not None and (state.result.verdict == UNEXPLAINED or not is_explained(state.result.fit)):
+    if state.result.fit is not None and (
+        state.result.verdict is DiagnosisVerdict.UNEXPLAINED or not is_explained(state.result.fit)
+    ):
         progress(0.4, "checking for a dispersion of the converters")
         state = _search_without_dispersion(state, linearity, laws)
     result = state.result
-    if result.verdict == UNEXPLAINED:
+    if result.verdict is DiagnosisVerdict.UNEXPLAINED:
         progress(0.6, "locating a force of unknown law")
         located = _locate_unknown_force(state)
         part = LARGELY if _free_force_explains(state.long, located.location) else MOSTLY
@@ -253,10 +259,14 @@ def _search_catalogue(data: LawFitData, linearity: Linearity, laws: Sequence[Law
     result = replace(judged, dispersion_rad=data.dispersion_rad)
     later = [times * short.duration_s for times in LATER if times * short.duration_s < long.duration_s]
     first_moments = chain([short], (make_problem(duration, FINE) for duration in later))
-    if result.fit is not None and result.verdict == UNEXPLAINED and _explains_first_moments(first_moments, result.fit):
+    if (
+        result.fit is not None
+        and result.verdict is DiagnosisVerdict.UNEXPLAINED
+        and _explains_first_moments(first_moments, result.fit)
+    ):
         early = "It explains their first moments; its later misfit grows from small errors of the model."
         statement = f"{result.findings[0].statement} {early}"
-        result = replace(result, verdict=EXPLAINED, is_early=True, statement=statement)
+        result = replace(result, verdict=DiagnosisVerdict.EXPLAINED, is_early=True, statement=statement)
     return _SearchState(data=data, short=short, long=long, fits=fits, gain_of_others=gain_of_others, result=result)
 
 
@@ -340,7 +350,7 @@ def _judge(
 ) -> LawSearch:
     if not fits:
         return LawSearch(
-            verdict=UNEXPLAINED,
+            verdict=DiagnosisVerdict.UNEXPLAINED,
             linearity=linearity,
             modal_model=modal_model,
             statement=f"{DISAGREE}; no law explains it.",
@@ -362,7 +372,7 @@ def _judge(
     else:
         statement = f"{findings[0].statement} {describe_working_range(best, modal_model)}"
     return LawSearch(
-        verdict=UNEXPLAINED if objection else EXPLAINED,
+        verdict=DiagnosisVerdict.UNEXPLAINED if objection else DiagnosisVerdict.EXPLAINED,
         linearity=linearity,
         findings=findings,
         nonlinear_evidence=agreement.gain,

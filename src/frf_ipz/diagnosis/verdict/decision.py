@@ -9,6 +9,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.deadline import DeadlineError
 from frf_ipz.diagnosis.evidence.map_fit import fit_map
+from frf_ipz.diagnosis.result import DiagnosisVerdict
 from frf_ipz.diagnosis.search.ambiguity_set import fit_distant_locations, rescore_ambiguity_set
 from frf_ipz.diagnosis.search.component_search import Ranking, fit_null_model, search_component, search_small_component
 from frf_ipz.diagnosis.search.pair_search import search_pair
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
 
 PAIR_SCORE = 0.75  # of a component that explains: above, pairs are tried too; 3 of 89 single ones had more
-CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
 # What was not looked at, where the time was over before that step was done
 WHOLE = "any effect"
 FIRST = "all effects at all their locations, and any second effect"
@@ -44,8 +44,8 @@ class Decision:
 
     Parameters
     ----------
-    verdict : str
-        ``consistent``, ``explained`` or ``unexplained``.
+    verdict : DiagnosisVerdict
+        What they say.
     null, final : Fit
         Of the nominal model with what its tolerances allow, and with what was found.
     ranking : Ranking
@@ -60,7 +60,7 @@ class Decision:
         What the time did not suffice for, in words; empty for a complete search.
     """
 
-    verdict: str
+    verdict: DiagnosisVerdict
     null: Fit
     final: Fit
     ranking: Ranking
@@ -114,14 +114,16 @@ def _decide_in_steps(problem: InferenceProblem, nothing: Decision, progress: Pro
         ranking = rescore_ambiguity_set(problem, fit_distant_locations(problem, ranking))
     first = _judge_first(problem, nothing, ranking, required)
     yield replace(first, not_searched=SECOND)
-    if first.verdict == CONSISTENT:
+    if first.verdict is DiagnosisVerdict.CONSISTENT:
         return
     progress(0.6, "searching for a second effect")
     if first.goodness.is_good:
         yield _accept_first(problem, first)
         return
     second = _search_pair(problem, ranking)
-    whole = replace(first, verdict=EXPLAINED, final=ranking.best, goodness=assess_goodness(problem, ranking.best))
+    whole = replace(
+        first, verdict=DiagnosisVerdict.EXPLAINED, final=ranking.best, goodness=assess_goodness(problem, ranking.best)
+    )
     pair_decision = _accept_further(problem, whole, second)
     if pair_decision is None:
         return
@@ -129,7 +131,7 @@ def _decide_in_steps(problem: InferenceProblem, nothing: Decision, progress: Pro
     yield replace(single or pair_decision, not_searched=THIRD)
     if (
         single is not None
-        or pair_decision.verdict == EXPLAINED
+        or pair_decision.verdict is DiagnosisVerdict.EXPLAINED
         or not pair_decision.final.is_nearly_right
         or log_bayes_factor(second.best, second.base) < STRONG_LOG_BAYES_FACTOR
     ):
@@ -138,20 +140,20 @@ def _decide_in_steps(problem: InferenceProblem, nothing: Decision, progress: Pro
     third = _accept_further(
         problem, pair_decision, search_small_component(problem, second.best, STRONG_LOG_BAYES_FACTOR)
     )
-    if third is not None and third.verdict == EXPLAINED:
+    if third is not None and third.verdict is DiagnosisVerdict.EXPLAINED:
         yield third
 
 
 def _judge_first(problem: InferenceProblem, nothing: Decision, ranking: Ranking, required: float) -> Decision:
     """Judge the best single component; the nominal model, where that explains as much."""
     null, best, goodness = nothing.null, ranking.best, assess_goodness(problem, ranking.best)
-    first = replace(nothing, verdict=EXPLAINED, final=best, ranking=ranking, goodness=goodness)
+    first = replace(nothing, verdict=DiagnosisVerdict.EXPLAINED, final=best, ranking=ranking, goodness=goodness)
     gain = log_bayes_factor(best, null)
     if nothing.null_goodness.is_good and (gain < required or not is_significant(best, -1)):
-        return replace(first, verdict=CONSISTENT, final=null, goodness=nothing.goodness)
+        return replace(first, verdict=DiagnosisVerdict.CONSISTENT, final=null, goodness=nothing.goodness)
     if goodness.is_good:
         return first
-    return replace(first, verdict=UNEXPLAINED, final=best if gain > required else null)
+    return replace(first, verdict=DiagnosisVerdict.UNEXPLAINED, final=best if gain > required else null)
 
 
 def _required_log_bayes_factor(problem: InferenceProblem, null_goodness: Goodness, best: Fit) -> float:
@@ -165,7 +167,7 @@ def _accept_first(problem: InferenceProblem, first: Decision) -> Decision:
     # the nominal model does not explain: what is likelier does
     required = min(FIRST_LOG_BAYES_FACTOR, LIMITS[problem.kind].second_log_bayes_factor)
     if not first.null_goodness.is_good and log_bayes_factor(first.final, first.null) < required:
-        return replace(first, verdict=UNEXPLAINED, final=first.null, goodness=first.null_goodness)
+        return replace(first, verdict=DiagnosisVerdict.UNEXPLAINED, final=first.null, goodness=first.null_goodness)
     second = rescore_ambiguity_set(
         problem, search_small_component(problem, first.final, LIMITS[problem.kind].beside_log_bayes_factor)
     )
@@ -204,7 +206,7 @@ def _accept_further(problem: InferenceProblem, decision: Decision, ranking: Rank
         required = decision.goodness.error_underestimation * limits.beside_log_bayes_factor
     if gain <= required or goodness.score >= max(decision.goodness.score, 1.0):
         return None
-    verdict = EXPLAINED if goodness.is_good else UNEXPLAINED
+    verdict = DiagnosisVerdict.EXPLAINED if goodness.is_good else DiagnosisVerdict.UNEXPLAINED
     return replace(
         decision,
         verdict=verdict,
@@ -232,7 +234,7 @@ def decide_without_search(problem: InferenceProblem, null: Fit | None = None) ->
     null = fit_null_model(problem) if null is None else null
     goodness = assess_goodness(problem, null)
     return Decision(
-        verdict=CONSISTENT if goodness.is_good else UNEXPLAINED,
+        verdict=DiagnosisVerdict.CONSISTENT if goodness.is_good else DiagnosisVerdict.UNEXPLAINED,
         null=null,
         final=null,
         ranking=Ranking(base=null, fits=(), n_tried=0),
@@ -260,7 +262,11 @@ def drop_last_component(problem: InferenceProblem, decision: Decision) -> Decisi
     rankings = decision.further_rankings[:-1]
     fit = rankings[-1].best if rankings else decision.ranking.best if decision.further_rankings else decision.null
     return replace(
-        decision, verdict=UNEXPLAINED, final=fit, further_rankings=rankings, goodness=assess_goodness(problem, fit)
+        decision,
+        verdict=DiagnosisVerdict.UNEXPLAINED,
+        final=fit,
+        further_rankings=rankings,
+        goodness=assess_goodness(problem, fit),
     )
 
 

@@ -14,8 +14,9 @@ from frf_ipz.diagnosis.measured.preprocessing.chain_effects import undo_chain_ef
 from frf_ipz.diagnosis.measured.preprocessing.dispersion import remove_dispersion
 from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.nonlinear.simulate import subtract_law
+from frf_ipz.diagnosis.result import DiagnosisVerdict
 from frf_ipz.diagnosis.search.component_search import fit_null_model, search_component
-from frf_ipz.diagnosis.verdict.decision import EXPLAINED, log_bayes_factor
+from frf_ipz.diagnosis.verdict.decision import log_bayes_factor
 from frf_ipz.diagnosis.verdict.findings import is_significant, make_finding, rank_effects
 from frf_ipz.diagnosis.verdict.goodness import LIMITS
 
@@ -81,7 +82,7 @@ def search_beside_linear(
     change = best.hypothesis.change(best.values)
     laws = search_laws(with_change(model, change), undo_chain_effects(observations, change))
     is_reduced = laws.fit is not None and laws.nuisance_chi2 < MAX_NUISANCE_CHI2 and _reduces_nuisance(laws, alone)
-    if sum((is_most, laws.verdict == EXPLAINED, is_reduced)) < 2:
+    if sum((is_most, laws.verdict is DiagnosisVerdict.EXPLAINED, is_reduced)) < 2:
         return None
     scale = max(1.0, best.mean_misfit)
     return laws, make_finding(rank_effects(ranking.fits, scale)[0], log_bayes_factor(best, null), scale)
@@ -119,7 +120,7 @@ def search_beside_law(
     remaining = _remove_law(observations, laws)
     if remaining is None:
         return None
-    explains, problem = laws.verdict == EXPLAINED, pose_with_observations(remaining)
+    explains, problem = laws.verdict is DiagnosisVerdict.EXPLAINED, pose_with_observations(remaining)
     null = fit_null_model(problem)
     ranking = search_component(problem, null)
     best = ranking.best
@@ -135,7 +136,7 @@ def search_beside_law(
     change = best.hypothesis.change(best.values)
     laws_beside = search_laws(with_change(model, change), undo_chain_effects(observations, change))
     if (
-        laws_beside.verdict != EXPLAINED
+        laws_beside.verdict is not DiagnosisVerdict.EXPLAINED
         or not _reduces_nuisance(laws_beside, laws)
         or not (explains or laws_beside.nuisance_chi2 < MAX_NUISANCE_CHI2)
     ):
@@ -155,7 +156,9 @@ def _remove_law(observations: Observations, laws: LawSearch) -> Observations | N
         or len(laws.nuisance_prior.moving)
     ):
         return None
-    if laws.verdict != EXPLAINED and (laws.after is None or laws.after.training_noise > MAX_MISFIT):
+    if laws.verdict is not DiagnosisVerdict.EXPLAINED and (
+        laws.after is None or laws.after.training_noise > MAX_MISFIT
+    ):
         return None
     with np.errstate(all="ignore"):  # it was fitted to the first moments, and may run away later
         linear = subtract_law(remove_dispersion(observations, laws.dispersion_rad), laws.nuisance_prior, laws.fit)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.model.layout import measure_extents
-from frf_ipz.diagnosis.verdict.decision import UNEXPLAINED
+from frf_ipz.diagnosis.result import DiagnosisVerdict
 from frf_ipz.diagnosis.verdict.goodness import assess_goodness
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def is_damping_only(problem: InferenceProblem, decision: Decision) -> bool:
     bool
         True where a search with free damping is worthwhile.
     """
-    if decision.verdict != UNEXPLAINED:
+    if decision.verdict is not DiagnosisVerdict.UNEXPLAINED:
         return False
     fits = (decision.final,) if decision.final.explains_nearly_all else (decision.final, decision.null)
     return any(is_damping_dominant(problem, fit) for fit in fits)

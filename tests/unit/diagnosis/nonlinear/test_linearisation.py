@@ -14,7 +14,7 @@ from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
 from frf_ipz.diagnosis.nonlinear.laws.dry_friction import DryFriction
 from frf_ipz.diagnosis.nonlinear.linearisation import linearise
 from frf_ipz.diagnosis.nonlinear.model.modal_model import Location
-from frf_ipz.diagnosis.result import Diagnosis, LinearisedLaw, Misfit
+from frf_ipz.diagnosis.result import Diagnosis, DiagnosisVerdict, LinearisedLaw, Misfit
 from frf_ipz.dofs import Dof
 from frf_ipz.runs.codec import load_result, save_result
 
@@ -74,7 +74,7 @@ def test_the_linear_model_has_spring_and_damper(tmp_path, location):
         damping_by_record=np.array([3.0]),
     )
     diagnosis = Diagnosis(
-        verdict="explained",
+        verdict=DiagnosisVerdict.EXPLAINED,
         findings=(),
         alternatives=(),
         mismatch_hz=np.zeros(0),

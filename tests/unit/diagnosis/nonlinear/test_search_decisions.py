@@ -9,6 +9,7 @@ from frf_ipz.diagnosis.nonlinear import search
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import ForceLocalisation
 from frf_ipz.diagnosis.nonlinear.fitting.simple_laws import SimpleLawsFit
 from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import Agreement
+from frf_ipz.diagnosis.result import DiagnosisVerdict
 
 LOCATIONS = tuple(range(10))
 
@@ -87,7 +88,7 @@ def test_long_segments_count_where_the_free_force_is_localised(monkeypatch, cost
 )
 def test_the_location_of_an_unknown_law_is_stated_where_a_force_there_explains_nearly_all(misfit, linear, is_stated):
     modal_model = SimpleNamespace(locations=[SimpleNamespace(words="node 1", entries={"nodes": [1]})])
-    unexplained = search.LawSearch(verdict=search.UNEXPLAINED, linearity=None)
+    unexplained = search.LawSearch(verdict=DiagnosisVerdict.UNEXPLAINED, linearity=None)
     located = simple_laws_at(0, 100 * misfit, linear_mean_misfit=linear)
     assert bool(search._with_location(unexplained, modal_model, located, search.MOSTLY).location) == is_stated
 
@@ -97,7 +98,7 @@ def test_the_ambiguity_set_is_stated_with_the_location_of_an_unknown_law():
         locations=[SimpleNamespace(words=f"node {i}", entries={"nodes": [i]}) for i in range(9)]
     )
     located = replace(simple_laws_at(5, 20.0), ambiguity_set=(5, 6, 4))
-    unexplained = search.LawSearch(verdict=search.UNEXPLAINED, linearity=None)
+    unexplained = search.LawSearch(verdict=DiagnosisVerdict.UNEXPLAINED, linearity=None)
     result = search._with_location(unexplained, modal_model, located, 0.5)
     assert result.location == {"nodes": [5]}
     assert result.statement.endswith("no closer than nodes 4 to 6.")
@@ -118,7 +119,7 @@ def test_a_free_force_explains_at_its_location_alone(costs, linear, explains):
 def test_linearity_that_is_known_is_not_assessed_again(monkeypatch):
     monkeypatch.setattr(search, "assess_linearity", None)
     result = search.search_laws(None, None, None, linearity=SimpleNamespace(is_nonlinear=False))
-    assert result.verdict == search.LINEAR
+    assert result.verdict is DiagnosisVerdict.CONSISTENT
 
 
 def first_moments(cost, *, afresh, is_moving=False):
