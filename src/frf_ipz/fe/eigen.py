@@ -400,7 +400,11 @@ def _factor_at_shift(model: StructuralModel, system: _System, shift: float) -> t
             return factorize(sparse.csr_array(system.stiffness + shift * system.mass), system.node_numbers), shift
         except IllConditionedError:
             if not (model.allows_negative_stiffness or system.in_print):
-                raise
+                raise IllConditionedError(
+                    f"the stiffness matrix of the model '{model.name}' is indefinite: it has a negative eigenvalue, "
+                    "beyond rounding. Check units and signs of what was exported; where that is meant, set [matrices] "
+                    "allow_negative_stiffness = true"
+                ) from None
         shift *= SHIFT_UP
     raise np.linalg.LinAlgError
 

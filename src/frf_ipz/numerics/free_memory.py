@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 if sys.platform != "win32":
-    pass
+    import resource
 
 KIBI = 1024
 UNLIMITED = 1 << 60  # what systems write for no limit is beyond
@@ -41,8 +41,6 @@ def _of_limit() -> int | None:
     used = _field(STATUS, "VmSize")
     if sys.platform == "win32" or used is None:
         return None
-    import resource
-
     most = resource.getrlimit(resource.RLIMIT_AS)[0]
     return max(most - KIBI * used, 0) if 0 <= most < UNLIMITED else None
 

@@ -39,6 +39,7 @@ WORDS = (
 EXAMPLE = "%%MatrixMarket matrix coordinate real symmetric"
 COMPRESSED = {b"\x1f\x8b": gzip.decompress, b"BZh": bz2.decompress}
 COMMENT = re.compile(rb"(?m)^[ \t]*+%[^\n]*+")
+HEAD = re.compile(rb"(?:[ \t]*+(?:%[^\n]*+)?\n)*+[ \t]*+")  # comments and empty lines before the size
 NUMBER = rb"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eEdDqQ][+-]?[0-9]++)?"
 VALUES = {n: rb"(?:[ \t]++" + NUMBER + rb"){%d}" % n for n in (1, 2)}
 ENTRIES = {
@@ -112,7 +113,10 @@ def _read_plain_bytes(path: Path) -> bytes:
                 raise FileFormatError(path, f"cannot be decompressed: {error}; export it again") from None
     if b"\0" in data:
         raise FileFormatError(path, "holds NUL bytes: it is no text, or one in UTF-16; export it as plain text")
-    return data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n") + b"\n"
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return data if data.endswith(b"\n") else data + b"\n"
 
 
 def _split(path: Path, data: bytes) -> _Text:
@@ -132,10 +136,13 @@ def _split(path: Path, data: bytes) -> _Text:
         raise FileFormatError(path, f"'{words[len(WORDS) + 1]}' stands behind the symmetry; omit it", where="line 1")
     if words[3] == "pattern":
         raise FileFormatError(path, "holds pattern values: places without numbers; export it with its values")
-    body = COMMENT.sub(b"", rest) if b"%" in rest else rest
-    start = len(body) - len(body.lstrip())
-    size_line = 2 + body.count(b"\n", 0, start)
-    sizes, _, entries = body[start:].partition(b"\n")
+    head = HEAD.match(rest)
+    start = 0 if head is None else head.end()
+    size_line = 2 + rest.count(b"\n", 0, start)
+    stop = (rest.find(b"\n", start) + 1) or len(rest)
+    sizes, entries = rest[start:stop], rest[stop:]
+    if b"%" in entries:
+        entries = COMMENT.sub(b"", entries)
     if any(byte > 127 for byte in sizes) or not all(word.isdigit() for word in sizes.split()):
         shown = sizes.decode("latin-1").strip()[:60]
         raise FileFormatError(path, f"'{shown}' is no size of a matrix", where=f"line {size_line}")
@@ -182,7 +189,7 @@ def _parse_fast(text: _Text) -> tuple[IntArray, IntArray, Any] | None:
         return None
     order = text.size[0]
     field = "complex" if text.field == "complex" else "real"
-    body = text.body.translate(TO_E)
+    body = text.body.translate(TO_E) if any(letter in text.body for letter in (b"d", b"D", b"q", b"Q")) else text.body
     if text.format == "array":
         counts = {count: triangle for triangle, count in _array_counts(text)}
         n_values = len(body.split()) // text.n_values
