@@ -1,5 +1,7 @@
 """Hum is no mode, and a mode that lines hardly resolve is no hum."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -115,3 +117,17 @@ def test_frfs_that_hold_noise_only_say_nothing_of_the_band(noise_hz):
     colour = np.ones(len(LINES_HZ)) if noise_hz is None else noise_hz / LINES_HZ
     values = np.column_stack([frfs.values[:, 0], noise * colour[:, None]])
     assert_complete(frf_set(LINES_HZ, values, frfs.labels), truth)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_light_modes_are_no_hum_where_a_window_makes_their_width(seed):
+    """A short record: lines that are independent lie three half widths of its exponential window apart."""
+    lines_hz, decay = np.arange(100, 1000) * 6.0, 12.0
+    truth = random_modes(np.geomspace(700.0, 5500.0, 14), 2e-4, n_outputs=1, n_inputs=1, seed=seed)
+    weak = np.where(np.arange(14) % 2, 0.1, 1.0)
+    truth = replace(truth, outputs=truth.outputs * weak)
+    s = decay + 2j * np.pi * lines_hz
+    values = truth.receptance(s) * s[:, None] ** 2
+    rng = np.random.default_rng(SEED + seed)
+    frfs = with_noise(lines_hz, values, labels_of(1, 1), 0.02 * np.abs(values), rng)  # in proportion, as of impacts
+    assert_complete(replace(without_variance(frfs), window_decay_1_s=decay), truth)

@@ -3,7 +3,8 @@
 A tone has no width. It stands on one line, or on the three of a Hann window's main lobe; cut off by a record without a
 window, it has the tails of a pole without damping. However narrow a mode is against the distance of lines, its tails
 reach over many of them. So a narrow pole must take off the misfit, on the lines outside a tone's lobe alone, what the
-BIC [Schwarz1978] demands for it.
+BIC [Schwarz1978] demands for it. Under an exponential window a tone has the tails of the window, as any pole has: they
+tell nothing there.
 
 A pole with tails and without a width that the lines show is told from a tone by its phase: residues of receptances are
 imaginary where the motion is caused by the force, and have any phase where it is not.
@@ -56,10 +57,10 @@ def find_hum(
     """
     reasons = [""] * len(fit.poles)
     by_number = float(np.log(2 * len(data.s)))  # by the BIC, for each number more
-    gains = pole_gains(fit.system)
+    gains, is_windowed = pole_gains(fit.system), bool(data.s.real[0] > 0)
     for number in np.flatnonzero(_is_narrow(data, fit)).tolist():
         factor = goodness.factor[number]
-        if _tail_significance(number, data, fit, terms, factor) < demanded:
+        if not is_windowed and _tail_significance(number, data, fit, terms, factor) < demanded:
             reasons[number] = "stands in single lines and has no tails: a steady tone, hum"
         elif not (
             _has_width(number, gains[number], goodness, by_number)

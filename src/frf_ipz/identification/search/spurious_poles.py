@@ -46,7 +46,9 @@ def find_spurious_poles(data: WeightedLines, fit: RefinedPoles, goodness: Goodne
         Why each pole is spurious; empty where it may be a mode.
     """
     poles, significance = fit.poles, goodness.significance
-    energy = np.sum((np.abs(fit.system.residues()) * data.gain / -poles.real[:, None]) ** 2, axis=1)
+    # as the lines see a peak: no narrower than half a line, or than an exponential window makes it
+    width = np.maximum(data.s.real[0] - poles.real, np.median(np.diff(data.s.imag)) / 2)
+    energy = np.sum((np.abs(fit.system.residues()) * data.gain / width[:, None]) ** 2, axis=1)
     reasons = []
     for number, pole in enumerate(poles):
         distance = np.abs(poles.imag - pole.imag)
