@@ -29,6 +29,7 @@ from frf_ipz.identification.results.repeated_roots import with_repeated_roots
 from frf_ipz.identification.results.tables import misfit_table, mode_table
 from frf_ipz.identification.results.zeros import ZerosWithErrors, find_zeros
 from frf_ipz.identification.root_covariance import RootCovariance
+from frf_ipz.identification.search.discrepancy import ONE_IMPACT, of_one_impact
 from frf_ipz.identification.search.drift import Drift, find_drift
 from frf_ipz.identification.search.find_modes import (
     FIXED_POLES,
@@ -257,6 +258,13 @@ def _warnings(
     frfs: FrfSet, fitted: FittedModes, halves: SplitHalf | None, unconfirmed: tuple[str, ...]
 ) -> tuple[str, ...]:
     texts = []
+    alone = of_one_impact(frfs)
+    if alone.any() and not fitted.poles_are_held:
+        which = "every FRF" if alone.all() else f"{alone.sum()} of {len(alone)} FRFs"
+        texts.append(
+            f"one impact stands behind {which}: how the next would differ is not seen, so that the fit counts on "
+            f"{ONE_IMPACT:.0%} of the FRF, in common over the width of a peak; three impacts or more show it"
+        )
     ratio = fitted.misfit_ratio
     if np.median(ratio) > MODEL_ERROR:
         noise = "of the recordings" if fitted.lines.known.all() else "that differs from line to line"

@@ -13,11 +13,10 @@ from frf_ipz.identification.fit import fit_modes, fit_residues
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.identification.results.gains import estimate_gains
 from frf_ipz.identification.results.shapes import mode_shapes
-from frf_ipz.ingest.campaign import VibrationTest
+from frf_ipz.ingest.campaign import Recording, VibrationTest
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.ingest.recorded_signals import Recording
 
 DEMO = Path(__file__).parents[3] / "data" / "raw" / "cantilever" / "test.toml"
 DEMO_DAMPING = np.array([0.015, 0.0036, 0.0024, 0.0021])  # data/README.md
@@ -140,15 +139,12 @@ def test_raw_impacts_of_a_lightly_damped_structure(recordings):
 
 @pytest.mark.slow
 def test_raw_impacts_cut_to_half_have_the_same_modes(recordings):
-    columns = [
-        np.loadtxt(path, delimiter=",", skiprows=1) for path in sorted((recordings / "raw_hammer" / "hits").glob("*.csv"))
-    ]
-    names = (recordings / "raw_hammer" / "hits" / "hit_1.csv").read_text().split("\n", 1)[0].split(",")
-    force, response = names.index("force"), names.index("acc")
+    files = sorted((recordings / "raw_hammer" / "hits").glob("*.csv"))
+    columns = [np.loadtxt(path, delimiter=",", skiprows=1) for path in files]
     impacts = [
         Recording(
-            force=values[: len(values) // 2, force],
-            responses=values[: len(values) // 2, response],
+            force=values[: len(values) // 2, 1],
+            responses=values[: len(values) // 2, 2],
             sample_rate_hz=25600.0,
             input_dof="2:+z",
             output_dofs=["1:+z"],
@@ -160,3 +156,22 @@ def test_raw_impacts_cut_to_half_have_the_same_modes(recordings):
     peaks = (810.3, 851.6, 900.0, 2640.2, 3007.5, 3035.3, 3669.0, 3689.4, 4127.6, 4163.2, 4391.7, 4421.0, 4470.0)
     assert all(np.abs(frequencies(fit) / hz - 1).min() < 1e-3 for hz in (*peaks, 5031.0, 5073.8, 5969.6, 6076.7))
     assert 31 <= fit.n_modes < 40
+
+
+@pytest.mark.slow
+def test_one_impact_on_a_milling_tool(recordings):
+    values = np.loadtxt(recordings / "milling_tool" / "Impact_Point1.txt")
+    impact = Recording(
+        force=values[:, 1], responses=values[:, 2], sample_rate_hz=51200.0, input_dof="1:+z", output_dofs=["1:+z"]
+    )
+    frfs = estimate_frfs(VibrationTest.from_recordings([impact])).frfs
+    bands = [None, (300.0, 3500.0), (306.0, 3500.0), (294.0, 3500.0), (300.0, 3430.0), (300.0, 3570.0)]
+    counts = []
+    for band in bands:
+        fit = fit_modes(frfs, options=FitOptions(band_hz=band))
+        assert all(np.abs(frequencies(fit) / hz - 1).min() < 0.03 for hz in (1074.0, 1235.0, 1815.0, 2612.0, 2735.0))
+        counts.append(fit.n_modes)
+    assert min(counts) >= 10
+    assert max(counts) <= 15
+    assert max(counts) - counts[1] <= 2
+    assert counts[1] - min(counts) <= 2

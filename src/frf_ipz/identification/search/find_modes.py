@@ -22,6 +22,7 @@ from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms, smooth_t
 from frf_ipz.identification.measured_lines import MeasuredLines, measured_lines, with_misfit_noise
 from frf_ipz.identification.search.arrivals import find_arrival
 from frf_ipz.identification.search.delays import CommonDelay, common_delay, each_delay, explains_misfit, measure_delay
+from frf_ipz.identification.search.discrepancy import with_discrepancy
 from frf_ipz.identification.search.drift import Drift
 from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, assess_fit, peak_levels
 from frf_ipz.identification.search.selection import ROUGH_ITERATIONS, SelectedModes, select_modes
@@ -182,6 +183,7 @@ def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progres
     start = find_start_poles(frfs, lines, max_order=options.max_order, stability=options.stability)
     terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(FIXED_POLES)
     lines = _with_noise_beside_peaks(lines, start.poles, terms)
+    lines = with_discrepancy(frfs, lines, start.poles, terms, options)
     progress(0.2, "adding and dropping poles")
     noise_is_known = bool(lines.known.all())
 

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.estimation.spectra import SpectrumSums
 
 CHANCE = 1e-6  # share of lines without a force that are taken for one with
+LEAST_FORCE = 1e-5  # of its largest power, 50 dB: a force that was cut to its pulse does not show its own noise
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -148,8 +149,8 @@ def impact_variance(sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray
     -------
     (n_lines, n_outputs) array
         E of the squared modulus of their error; of a single impact it follows from the noise in its own record. NaN
-        where there is no force, or none that stands out from its noise, and from the first line on where records that
-        begin within the pulse lack too much of it.
+        where there is no force, or none that stands out from its noise; from the first line on where records that begin
+        within the pulse lack too much of it, or where a force without noise has no energy.
     """
     gain = np.abs(values) ** 2
     counts = np.maximum(sums.counts, 1)
@@ -164,6 +165,7 @@ def impact_variance(sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray
         variance = unexplained * power / own_power**2
         variance += gain * (noise.missing_force / sums.force).T ** 2 + (noise.missing_response / sums.force).T ** 2
         is_recorded = MOST_MISSING * power >= noise.missing_force.T
+        is_recorded &= (noise.force.T > 0.0) | (power > LEAST_FORCE * power.max(axis=0))
     return np.asarray(np.where((own_power > 0.0) & _up_to_first_hole(is_recorded), variance, np.nan))
 
 
