@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import warnings
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -40,7 +41,7 @@ def errors_of_reader(path: Path, kind: str) -> Iterator[None]:
         In the place of any error that is none of the package.
     """
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), _heard_logs() as heard:
             warnings.simplefilter("ignore")
             yield
     except FrfIpzError:
@@ -48,9 +49,37 @@ def errors_of_reader(path: Path, kind: str) -> Iterator[None]:
     except MemoryError:
         raise FileFormatError(path, f"does not fit into memory as {kind}; export less") from None
     except Exception as error:  # a library raises anything on damaged bytes
-        said = " ".join(str(error).split())[:LONGEST] or type(error).__name__
-        problem = f"cannot be read as {kind}: it is cut off or damaged ({said}); copy or export it again"
-        raise FileFormatError(path, problem) from None
+        raise _damaged(path, kind, str(error) or type(error).__name__) from None
+    if heard:  # it was read all the same, as far as it goes
+        raise _damaged(path, kind, heard[0])
+
+
+def _damaged(path: Path, kind: str, text: str) -> FileFormatError:
+    said = " ".join(text.split())[:LONGEST]
+    return FileFormatError(
+        path, f"cannot be read as {kind}: it is cut off or damaged ({said}); copy or export it again"
+    )
+
+
+@contextmanager
+def _heard_logs() -> Iterator[list[str]]:
+    """Keep what libraries log as a warning or worse off the user's screen, and hear it."""
+    heard: list[str] = []
+
+    def hear(record: logging.LogRecord) -> bool:
+        if record.levelno >= logging.WARNING:
+            heard.append(record.getMessage())
+        return False
+
+    loggers = [logger for logger in logging.root.manager.loggerDict.values() if isinstance(logger, logging.Logger)]
+    foreign = [logger for logger in loggers if logger.name.partition(".")[0] != __package__]
+    for logger in foreign:
+        logger.addFilter(hear)
+    try:
+        yield heard
+    finally:
+        for logger in foreign:
+            logger.removeFilter(hear)
 
 
 def import_reader(path: Path, module: str, *, kind: str, extra: str) -> Any:  # noqa: ANN401 - a module has no type

@@ -10,7 +10,7 @@ import openpyxl
 import pytest
 
 import frf_ipz
-from frf_ipz.errors import InputError
+from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.ingest.formats.recording import TableKeys
 from frf_ipz.ingest.formats.registry import look_at_recording, open_recording
 from synthetic_campaign import Structure, impact
@@ -209,3 +209,12 @@ def test_a_file_of_labview_that_was_thinned_out_keeps_its_own_times(tmp_path):
     (tmp_path / "a.lvm").write_text("\n".join([*lines[:first], *lines[first::16]]) + "\n")
     table = next(open_recording(tmp_path / "a.lvm", ["force"]).blocks)
     np.testing.assert_allclose(table[:, 0], TIME[::16], rtol=1e-12)
+
+
+def test_a_file_that_is_cut_off_is_refused_and_no_library_prints(tmp_path, capfd):
+    path = tmp_path / "a.tdms"
+    write_tdms(path)
+    path.write_bytes(path.read_bytes()[:-5])
+    with pytest.raises(FileFormatError, match=r"a\.tdms.*cut off or damaged.*less data than expected"):
+        next(open_recording(path, NAMES).blocks)
+    assert capfd.readouterr() == ("", "")

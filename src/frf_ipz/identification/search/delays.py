@@ -152,7 +152,8 @@ def common_delay(
     late = _normal(lines.advanced(np.full(n_frfs, delay)))
     if len(poles) < FEWEST_MODES or not _turns_most_modes(normal, late, poles, terms):
         return None
-    return measure_delay(lines, poles, terms, delay)
+    measured = measure_delay(lines, poles, terms, delay)
+    return measured if measured.delay_s**2 > by_number * measured.std_s**2 else None
 
 
 def measure_delay(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms, delay_s: float) -> CommonDelay:
