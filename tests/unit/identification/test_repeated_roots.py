@@ -8,7 +8,7 @@ import pytest
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.identification.results.shapes import mode_shapes
-from synthetic_frfs import Modes, accelerances, frf_set, random_modes
+from synthetic_frfs import Modes, accelerances, frf_set, labels_of, random_modes, with_noise
 
 LINES_HZ = np.arange(40, 401) * 0.5
 SHAPES = np.array([[1.0, 0.2, -0.7, 0.4], [-0.3, 1.0, 0.5, 0.6], [0.5, -0.6, 0.4, 1.0]]).T
@@ -75,3 +75,31 @@ def test_shapes_that_differ_by_the_mounting_are_no_second_mode():
     gains = 1 + 0.05 * np.random.default_rng(SEED).standard_normal(frfs.n_frfs)
     fit = fit_modes(replace(frfs, values=frfs.values * gains), options=FitOptions())
     assert fit.n_modes == 3
+
+
+def two_axes(*, repeated, seed):
+    """Vertical and horizontal ports: what crosses over is a thousand times smaller, and its noise as well."""
+    truth = random_modes([60.0, 110.0, 110.0 if repeated else 130.0, 160.0], 0.01, n_outputs=6, n_inputs=6, seed=seed)
+    crossing = np.where(np.arange(6) < 3, 1.0, 1e-3)
+    truth = Modes(truth.frequency_hz, truth.damping_ratio, truth.outputs * crossing[:, None], truth.inputs)
+    exact = truth.receptance(2j * np.pi * LINES_HZ) * (2j * np.pi * LINES_HZ[:, None]) ** 2
+    exact = exact.reshape(-1, 6, 6) * np.where(np.arange(6) < 3, 1.0, 1e-3)
+    std = np.sqrt(np.mean(np.abs(exact) ** 2, axis=0)) * 1e-3
+    std[3:, 3:] *= 1e3  # no product of a row and a column
+    return with_noise(LINES_HZ, exact.reshape(-1, 36), labels_of(6, 6), std.ravel(), np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("repeated", [True, False])
+def test_noise_that_differs_over_a_grid_of_two_axes_is_weighed(repeated):
+    fit = fit_modes(two_axes(repeated=repeated, seed=SEED), options=FitOptions())
+    assert fit.n_modes == 4
+    assert ("share the frequency" in " ".join(fit.warnings)) == repeated
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_strong_modes_above_the_band_make_no_false_mode(seed):
+    """Three fixed poles are too few here: one seed had a false mode, FRFs of low level four times their noise left."""
+    modes = random_modes([60.0, 110.0, 160.0, 190.0, 209.0, 230.0, 260.0], 0.005, n_outputs=4, n_inputs=4, seed=seed)
+    fit = fit_modes(accelerances(modes, LINES_HZ, noise=1e-4, seed=seed), options=FitOptions())
+    assert fit.n_modes == 4
+    assert fit.misfit["ratio"].max() < 2.0

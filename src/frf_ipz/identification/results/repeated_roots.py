@@ -16,6 +16,7 @@ from scipy import linalg, sparse
 from frf_ipz.identification.results.shapes import product_factors
 from frf_ipz.identification.root_covariance import RootCovariance, pair_blocks
 from frf_ipz.modes import modal_phase_collinearity
+from frf_ipz.numerics.low_rank_fit import fit_products
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
@@ -60,19 +61,27 @@ def with_repeated_roots(fit: ModalFit) -> ModalFit:
 
 
 def _of_rank_two(products: ComplexArray, variance: FloatArray, n_lines: int) -> IntArray:
-    """Find the modes whose second singular value exceeds the noise, and what other modes have, as the BIC demands."""
+    """Find modes whose second product exceeds the noise of each entry, and what others have, as the BIC demands."""
     n_outputs, n_inputs = products.shape[1:]
-    log_std = np.log(np.maximum(variance, np.finfo(float).tiny)) / 2
-    scale = log_std.mean(axis=1, keepdims=True) + log_std.mean(axis=2, keepdims=True)
-    values = np.linalg.svd(products / np.exp(scale - log_std.mean(axis=(1, 2), keepdims=True)), compute_uv=False)
-    beyond = np.sum(values[:, 1:] ** 2, axis=1)
-    relative = beyond / np.maximum(values[:, 0] ** 2, np.finfo(float).tiny)
+    weights = 1 / np.maximum(variance, np.finfo(float).tiny)
+    one, two = (
+        np.array([_misfit(matrix, weight, rank) for matrix, weight in zip(products, weights, strict=True)])
+        for rank in (1, 2)
+    )
+    total = np.sum(weights * np.abs(products) ** 2, axis=(1, 2))
+    relative = one / total
     others = [
         float(np.median(np.delete(relative, mode))) if len(relative) > 1 else 0.0 for mode in range(len(relative))
     ]
-    level = np.maximum(1.0, np.array(others) * values[:, 0] ** 2 / ((n_outputs - 1) * (n_inputs - 1)))
+    level = np.maximum(1.0, np.array(others) * total / ((n_outputs - 1) * (n_inputs - 1)))
     demanded = 2 * (n_outputs + n_inputs - 2) * np.log(2 * n_lines)
-    return np.flatnonzero(2 * values[:, 1] ** 2 / level > demanded)
+    return np.flatnonzero(2 * (one - two) / level > demanded)
+
+
+def _misfit(matrix: ComplexArray, weight: FloatArray, rank: int) -> float:
+    """Weighted sum of squares that products leave."""
+    rows, columns = fit_products(matrix, weight, rank)
+    return float(np.sum(weight * np.abs(matrix - rows @ columns.T) ** 2))
 
 
 def _two_products(matrix: ComplexArray, driving: list[tuple[int, int]]) -> list[ComplexArray]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.modes import ModeSet
+from frf_ipz.numerics.low_rank_fit import fit_products
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.modal_fit import ModalFit
-
-SWEEPS = 30  # of the alternating fit of a product to the measured residues
 
 
 def mode_shapes(fit: ModalFit) -> ModeSet:
@@ -48,7 +47,7 @@ def mode_shapes(fit: ModalFit) -> ModeSet:
     dofs = tuple(dict.fromkeys((*outputs, *inputs))) if driving else max(outputs, inputs, key=len)
     shapes = np.empty((len(dofs), len(poles)), complex)
     for mode, matrix in enumerate(matrices):
-        at_outputs, at_inputs = _fit_rank_one(matrix, measured)
+        at_outputs, at_inputs = (vectors[:, 0] for vectors in fit_products(matrix, measured.astype(float), 1))
         if driving:
             at_outputs, at_inputs = _scaled_at_driving_points(at_outputs, at_inputs, outputs, inputs, driving)
         shapes[:, mode] = _normalised(at_outputs, at_inputs, outputs, inputs, dofs, keep_size=bool(driving))
@@ -107,20 +106,6 @@ def _residue_matrices(
         matrices[:, *entry] = products[:, column]
         measured[entry] = True
     return matrices, measured
-
-
-def _fit_rank_one(matrix: ComplexArray, measured: BoolArray) -> tuple[ComplexArray, ComplexArray]:
-    """Find the product of two vectors, over outputs and inputs, that fits the measured entries best."""
-    at_inputs = matrix[np.argmax(np.sum(np.abs(matrix), axis=1))].copy()
-    at_outputs = np.zeros(len(matrix), complex)
-    for _ in range(SWEEPS):
-        at_outputs = matrix @ at_inputs.conj() / _positive_or_infinite(measured @ np.abs(at_inputs) ** 2)
-        at_inputs = matrix.T @ at_outputs.conj() / _positive_or_infinite(measured.T @ np.abs(at_outputs) ** 2)
-    return at_outputs, at_inputs
-
-
-def _positive_or_infinite(values: np.ndarray) -> np.ndarray:
-    return np.where(values > 0, values, np.inf)
 
 
 def _scaled_at_driving_points(

@@ -15,11 +15,11 @@ import pandas as pd
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NoModesError
-from frf_ipz.identification.likelihood.compression import compress, response
+from frf_ipz.identification.likelihood.compression import column_gains, compress, response
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
 from frf_ipz.identification.likelihood.sandwich import pole_variance_factors
 from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms, smooth_terms_of_band
-from frf_ipz.identification.measured_lines import MeasuredLines, measured_lines, with_misfit_noise
+from frf_ipz.identification.measured_lines import MeasuredLines, WeightedLines, measured_lines, with_misfit_noise
 from frf_ipz.identification.search.arrivals import find_arrival
 from frf_ipz.identification.search.delays import CommonDelay, common_delay, each_delay, explains_misfit, measure_delay
 from frf_ipz.identification.search.discrepancy import with_discrepancy
@@ -181,7 +181,8 @@ def _fit_advanced(frfs: FrfSet, delay: CommonDelay, options: FitOptions) -> Fitt
 def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progress: Progress) -> FittedModes:
     progress(0.05, "looking for first poles")
     start = find_start_poles(frfs, lines, max_order=options.max_order, stability=options.stability)
-    terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(FIXED_POLES)
+    all_terms = smooth_terms_of_band(lines.band_hz, lines.line_hz)
+    terms = all_terms.first(FIXED_POLES)
     lines = _with_noise_beside_peaks(lines, start.poles, terms)
     lines = with_discrepancy(frfs, lines, start.poles, terms, options)
     progress(0.2, "adding and dropping poles")
@@ -189,8 +190,11 @@ def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progres
 
     def fit_lines(lines: MeasuredLines, delay_s: FloatArray) -> FittedModes:
         selected = _select(lines, start.poles, terms, options, noise_is_known=noise_is_known)
+        demanded = _demanded_terms(selected.data, selected.fit.poles, all_terms)
+        if demanded.n_columns > terms.n_columns:  # some poles may have stood for them
+            selected = _select(lines, selected.fit.poles, demanded, options, noise_is_known=noise_is_known)
         progress(0.5, "refining")
-        return _refine_with_final_weights(lines, selected, terms, start=start.table, delay_s=delay_s)
+        return _refine_with_final_weights(lines, selected, demanded, start=start.table, delay_s=delay_s)
 
     def find_poles(lines: MeasuredLines) -> ComplexArray:
         complex_modes = replace(options, modes="complex")
@@ -211,6 +215,20 @@ def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progres
         progress(0.55, "adding and dropping poles by the model error")
         fitted = _against_model_error(fitted, options)
     return fitted
+
+
+def _demanded_terms(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) -> SmoothTerms:
+    """Take fixed poles beyond the first where the BIC of any FRF demands them: their lack would bend its residues."""
+    n_lines, n_frfs = data.receptance.shape
+    system = compress(data, poles, terms)
+    if 2 * n_lines <= system.n_linear:
+        return terms.first(FIXED_POLES)
+    level = np.maximum(system.misfit / (2 * n_lines - system.n_linear), 1.0)
+    fewer = range(FIXED_POLES, len(terms.poles))
+    columns = [list(range(terms.first(n_fixed).n_columns, terms.n_columns)) for n_fixed in fewer]
+    demanded = np.array([len(group) * log(2 * n_lines) + 2 * log(n_frfs) for group in columns])
+    is_too_few = (column_gains(system, columns) / level > demanded[:, None]).any(axis=1)
+    return terms.first(int(np.max(np.array(fewer)[is_too_few], initial=FIXED_POLES - 1)) + 1)
 
 
 def _with_noise_beside_peaks(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms) -> MeasuredLines:
