@@ -20,6 +20,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.evidence.hypothesis import Component
 from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, compute_weights
 from frf_ipz.diagnosis.model.motion import Motion, stack_motions
+from frf_ipz.diagnosis.search.places import search_places
 from frf_ipz.diagnosis.search.robust_refinement import Start, compute_robust_misfit
 
 if TYPE_CHECKING:
@@ -381,15 +382,19 @@ def _scan(
     response = base.hypothesis.respond(base.values, nuisance, measured.s)
     basis, layout = base.hypothesis.basis, context.layout
 
-    def scan(shown: ShownComponents) -> list[Start]:
-        signed = scan_signatures(*shown.signed, response, basis, layout, measured, weights)
-        local = problem.nuisance_prior.unpack(nuisance).local
-        return signed + _scan_readings(*shown.read, response, basis, layout, local, measured, weights)
+    local = problem.nuisance_prior.unpack(nuisance).local
 
-    shown = show_components(context, components)
-    starts = sorted(scan(shown), key=lambda start: start.cost)
-    starts += scan(show_components(context, _unlisted_neighbours(context, components, starts)))
-    starts += [find_best_start(problem, base, component, measured, weights, nuisance) for component in shown.unshown]
+    def evaluate(some: Sequence[Component]) -> list[Start]:
+        shown = show_components(context, some)
+        return [
+            *scan_signatures(*shown.signed, response, basis, layout, measured, weights),
+            *_scan_readings(*shown.read, response, basis, layout, local, measured, weights),
+            *(find_best_start(problem, base, component, measured, weights, nuisance) for component in shown.unshown),
+        ]
+
+    starts = search_places(context, problem.nuisance_prior.n_modes, components, evaluate)
+    starts.sort(key=lambda start: start.cost)
+    starts += evaluate(_unlisted_neighbours(context, components, starts))
     return sorted(starts, key=lambda start: start.cost)
 
 

@@ -22,6 +22,7 @@ from frf_ipz.diagnosis.search.global_scan import (
     read_elsewhere,
     show_components,
 )
+from frf_ipz.diagnosis.search.places import search_places
 from frf_ipz.diagnosis.search.robust_refinement import Start
 from frf_ipz.numerics.least_squares import cholesky_with_prior
 
@@ -181,12 +182,16 @@ def run_score_test(problem: InferenceProblem, base: Fit) -> list[Start]:
     test = prepare_score_test(problem, base, problem.sparse_data)
     context = replace(problem.context, contour=problem.sparse_data.measured.s)
     components = [component for effect in problem.effects.values() for component in list_components(effect, context)]
-    shown = show_components(context, components)
-    signed = list(zip(*shown.signed, strict=True))
-    response = base.hypothesis.respond(base.values, base.nuisance, context.contour)
-    starts = _score_signatures(test, response, signed)
-    starts += _score_readings(test, *shown.read)
-    starts += [_score_directly(test, component) for component in shown.unshown]
+
+    def evaluate(some: Sequence[Component]) -> list[Start]:
+        shown = show_components(context, some)
+        return [
+            *_score_signatures(test, list(zip(*shown.signed, strict=True))),
+            *_score_readings(test, *shown.read),
+            *(_score_directly(test, component) for component in shown.unshown),
+        ]
+
+    starts = search_places(context, problem.nuisance_prior.n_modes, components, evaluate)
     return sorted(starts, key=lambda start: start.cost)
 
 
@@ -207,7 +212,7 @@ def _score_readings(test: ScoreTest, components: Sequence[Component], readings: 
     return starts
 
 
-def _score_signatures(test: ScoreTest, response: Response, signed: list[tuple[Component, Signature]]) -> list[Start]:
+def _score_signatures(test: ScoreTest, signed: list[tuple[Component, Signature]]) -> list[Start]:
     """Score all shapes of all signatures; keep the best of each."""
     best: dict[int, Start] = {}
     batch: list[tuple[int, int, ComplexArray]] = []
@@ -216,7 +221,7 @@ def _score_signatures(test: ScoreTest, response: Response, signed: list[tuple[Co
         motions = [Motion.of(signature.motion) for _, signature in group]
         hypothesis = test.base.hypothesis
         layout = hypothesis.context.layout
-        across = evaluate_receptances(response, hypothesis.basis, layout, motions, np.zeros(len(group))).across
+        across = evaluate_receptances(test.response, hypothesis.basis, layout, motions, np.zeros(len(group))).across
         for column, (_, signature) in enumerate(group):
             for shape, curve in enumerate(signature.shapes):
                 batch.append((first + column, shape, -across[:, :, column] * curve[:, None]))

@@ -1,0 +1,144 @@
+"""Which of many places are looked at: a coarse set all over the structure first, and then all around the best of them.
+
+What an effect explains varies from node to node as the shapes of the modes do. The m-th mode has at most m domains of
+one sign [Courant1923]; with some places in each, one is near the true place, which is then among those around the best.
+The mesh may be as fine as it likes.
+
+[Courant1923] R. Courant, Ein allgemeiner Satz zur Theorie der Eigenfunktionen selbstadjungierter Differentialausdrücke,
+Nachrichten von der Gesellschaft der Wissenschaften zu Göttingen (1923) 81-84.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from frf_ipz.arrays import FloatArray, IntArray
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+    from frf_ipz.diagnosis.evidence.hypothesis import Component
+    from frf_ipz.diagnosis.search.robust_refinement import Start
+
+PLACES_PER_MODE = 8  # in each domain of the highest mode: some three across it
+BEST_PLACES = 4  # around which all are looked at
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlaceGroup:
+    """Components that differ by their node alone.
+
+    Parameters
+    ----------
+    components : list of Component
+        An effect at one node after the other.
+    positions : (n, 3) array
+        Of these nodes, m.
+    coarse : (n_coarse,) int array
+        Indices of those that are looked at first.
+    reach : float
+        How far the farthest place is from the nearest of these, m.
+    """
+
+    components: Sequence[Component]
+    positions: FloatArray
+    coarse: IntArray
+    reach: float
+
+    def around(self, starts: Iterable[Start]) -> list[Component]:
+        """List what lies around the best of the coarse places.
+
+        Parameters
+        ----------
+        starts : iterable of Start
+            Of the coarse places.
+
+        Returns
+        -------
+        list of Component
+            Those that were not looked at yet.
+        """
+        index = {component.key: number for number, component in enumerate(self.components)}
+        ranked = sorted((start.cost, index[start.component.key]) for start in starts if start.component.key in index)
+        is_new = np.ones(len(self.components), bool)
+        is_new[self.coarse] = False
+        is_near = np.zeros(len(self.components), bool)
+        for _, best in ranked[:BEST_PLACES]:
+            is_near |= np.linalg.norm(self.positions - self.positions[best], axis=1) <= self.reach
+        return [self.components[number] for number in np.flatnonzero(is_near & is_new).tolist()]
+
+
+def search_places(
+    context: ModelContext,
+    n_modes: int,
+    components: Iterable[Component],
+    evaluate: Callable[[Sequence[Component]], list[Start]],
+) -> list[Start]:
+    """Evaluate components, of those that differ by their node alone the promising ones.
+
+    Parameters
+    ----------
+    context : ModelContext
+        Model, layout and tolerances.
+    n_modes : int
+        Number of modes that the measurement shows.
+    components : iterable of Component
+        Effects at their locations.
+    evaluate : callable
+        Gives the best values and the cost of components.
+
+    Returns
+    -------
+    list of Start
+        In the order of evaluation.
+    """
+    groups, others = _group_by_node(context, PLACES_PER_MODE * n_modes, components)
+    starts = evaluate([*others, *(group.components[number] for group in groups for number in group.coarse.tolist())])
+    around = [component for group in groups for component in group.around(starts)]
+    return starts + (evaluate(around) if around else [])
+
+
+def _group_by_node(
+    context: ModelContext, n_coarse: int, components: Iterable[Component]
+) -> tuple[list[PlaceGroup], list[Component]]:
+    """Group components that differ by their node, where there are many of them; and give all others."""
+    alike: dict[tuple[object, ...], list[tuple[int, Component]]] = {}
+    others: list[Component] = []
+    for component in components:
+        nodes = component.location.entries.get("nodes")
+        if isinstance(nodes, list) and len(nodes) == 1 and nodes[0] in context.positions:
+            rest = tuple(part for part in component.key if part != nodes[0])
+            alike.setdefault(rest, []).append((nodes[0], component))
+        else:
+            others.append(component)
+    groups = []
+    for members in alike.values():
+        if len(members) <= n_coarse or context.model.geometry.is_schematic:
+            others += [component for _, component in members]
+            continue
+        positions = np.array([context.positions[node] for node, _ in members])
+        coarse, reach = _spread(positions, n_coarse)
+        groups.append(
+            PlaceGroup(
+                components=[component for _, component in members], positions=positions, coarse=coarse, reach=reach
+            )
+        )
+    return groups, others
+
+
+def _spread(positions: FloatArray, count: int) -> tuple[IntArray, float]:
+    """Choose places that are as far apart as can be, one after the other, and say how far all others are from them.
+
+    [Gonzalez1985] T. F. Gonzalez, Clustering to minimize the maximum intercluster distance, Theoretical Computer
+    Science 38 (1985) 293-306: the reach is at most twice that of the best choice.
+    """
+    chosen = [0]
+    distance = np.linalg.norm(positions - positions[0], axis=1)
+    while len(chosen) < count:
+        farthest = int(np.argmax(distance))
+        chosen.append(farthest)
+        distance = np.minimum(distance, np.linalg.norm(positions - positions[farthest], axis=1))
+    return np.sort(np.array(chosen, np.int64)), float(distance.max())
