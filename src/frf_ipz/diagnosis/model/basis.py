@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.model.motion import stack_motions
@@ -25,7 +25,7 @@ from frf_ipz.numerics.pencils import generalised_eigh
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.arrays import Matrix
+    from frf_ipz.arrays import IntArray, Matrix
     from frf_ipz.diagnosis.model.change import Change
     from frf_ipz.diagnosis.model.motion import Motion
     from frf_ipz.dofs import AnyDof
@@ -85,7 +85,8 @@ class Basis:
         (q, q) array
             The same in the basis.
         """
-        return np.asarray(self.vectors.T @ multiply(matrix, self.vectors))
+        rows = _nonzero_rows(matrix)
+        return np.asarray(self.vectors[rows].T @ multiply(matrix[rows], self.vectors))
 
     def project_motions(self, motions: Sequence[Motion]) -> FloatArray:
         """Bring motions into these coordinates.
@@ -125,12 +126,13 @@ def make_basis(model: StructuralModel, highest_rad_s: float, measured: Sequence[
     low = max(int(np.count_nonzero(modes.omega_rad_s <= MODES_UP_TO * highest_rad_s)), min(MIN_MODES, order))
     start = modes.first(low)
     loads = model.full_rows([dof.unsigned for dof in measured]).toarray().T
+    vectors = _to_all_dofs(model, start.shapes)
     plain = Basis(
         model=model,
         modes=modes,
-        vectors=_to_all_dofs(model, start.shapes),
-        stiffness=np.diag(start.eigenvalues),
-        damping=np.zeros((low, low)),
+        vectors=vectors,
+        stiffness=_symmetric(vectors.T @ multiply(model.stiffness_all, vectors)),
+        damping=_symmetric(vectors.T @ multiply(model.damping_all, vectors)),
         highest_rad_s=highest_rad_s,
         measured=tuple(measured),
     )
@@ -171,7 +173,8 @@ def enrich_basis(basis: Basis, change: Change) -> Basis:
         if matrix is not None:
             first = multiply(matrix, around)
             loads.append(first)
-            if np.linalg.matrix_rank(first, tol=1e-9 * np.linalg.norm(first)) > 2:
+            loaded = first[_nonzero_rows(matrix)]
+            if np.linalg.matrix_rank(loaded, tol=1e-9 * np.linalg.norm(loaded)) > 2:
                 loads.append(multiply(matrix, _deflections(basis, first)))
     loads += [attachment.motions for attachment in change.attachments]
     if change.moved:
@@ -237,9 +240,12 @@ def _to_all_dofs(model: StructuralModel, shapes: FloatArray) -> FloatArray:
 def _deflections(basis: Basis, loads: FloatArray) -> FloatArray:
     """(K + tau M)^-1 times loads at the free DOFs, without what is not independent."""
     free = loads[~basis.model.fixed]
-    sizes = np.linalg.norm(free, axis=0)
-    columns, sizes, _ = np.linalg.svd(free[:, sizes > 0] / sizes[sizes > 0], full_matrices=False)
-    free = columns[:, sizes > 1e-8 * max(sizes.max(initial=0.0), np.finfo(float).tiny)]
+    loaded = np.flatnonzero(free.any(axis=1))  # few, for an effect at a node
+    sizes = np.linalg.norm(free[loaded], axis=0)
+    columns, sizes, _ = np.linalg.svd(free[np.ix_(loaded, sizes > 0)] / sizes[sizes > 0], full_matrices=False)
+    columns = columns[:, sizes > 1e-8 * max(sizes.max(initial=0.0), np.finfo(float).tiny)]
+    free = np.zeros((len(free), columns.shape[1]))
+    free[loaded] = columns
     return _to_all_dofs(basis.model, basis.modes.factor.solve(free))
 
 
@@ -275,11 +281,23 @@ def _add_shapes(basis: Basis, shapes: FloatArray) -> Basis:
         model=model,
         modes=basis.modes,
         vectors=vectors,
-        stiffness=_symmetric(vectors.T @ multiply(model.stiffness_all, vectors)),
-        damping=_symmetric(vectors.T @ multiply(model.damping_all, vectors)),
+        stiffness=_enlarge(basis.stiffness, vectors, multiply(model.stiffness_all, fresh)),
+        damping=_enlarge(basis.damping, vectors, multiply(model.damping_all, fresh)),
         highest_rad_s=basis.highest_rad_s,
         measured=basis.measured,
     )
+
+
+def _enlarge(projected: FloatArray, vectors: FloatArray, forces: FloatArray) -> FloatArray:
+    """Enlarge a matrix in the coordinates of the first vectors by the forces of the others."""
+    count = len(projected)
+    columns = vectors.T @ forces
+    return np.block([[projected, columns[:count]], [columns[:count].T, _symmetric(columns[count:])]])
+
+
+def _nonzero_rows(matrix: Matrix) -> IntArray:
+    """Rows of a sparse matrix that have entries: few, for an effect at a node."""
+    return np.flatnonzero(np.diff(sparse.csr_array(matrix).indptr)).astype(np.int64)
 
 
 def _sizes(model: StructuralModel, shapes: FloatArray) -> FloatArray:

@@ -121,6 +121,7 @@ def make_motion_row(model: StructuralModel, dof: AnyDof) -> FloatArray:
     return np.asarray(model.full_rows([dof]).toarray()[0])
 
 
+@lru_cache(maxsize=4)  # every hypothesis asks for it
 def measure_extents(model: StructuralModel) -> Mapping[str, float]:
     """Size of a structure along each axis.
 

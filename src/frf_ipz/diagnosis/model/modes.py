@@ -14,7 +14,6 @@ from scipy import linalg
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.model.basis import solve_changed_modes
-from frf_ipz.diagnosis.model.layout import make_motion_row
 from frf_ipz.diagnosis.model.nuisance import make_all_shift_rows
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.eigen import mode_damping_ratios
@@ -192,8 +191,8 @@ def make_motion_rows(basis: Basis, layout: Layout, change: Change, nuisance_prio
         for channel, dof in layout.outputs
     )
     return MotionRows(
-        outputs=np.array([make_motion_row(basis.model, dof) for dof in outputs]) @ basis.vectors,
-        inputs=np.array([make_motion_row(basis.model, dof) for dof in layout.inputs]) @ basis.vectors,
+        outputs=np.asarray(basis.model.full_rows(outputs) @ basis.vectors),
+        inputs=np.asarray(basis.model.full_rows(layout.inputs) @ basis.vectors),
         output_shifts=make_all_shift_rows(basis, nuisance_prior, outputs),
         input_shifts=make_all_shift_rows(basis, nuisance_prior, layout.inputs),
     )

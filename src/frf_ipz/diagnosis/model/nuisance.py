@@ -434,5 +434,6 @@ def make_all_shift_rows(basis: Basis, nuisance_prior: NuisancePrior, dofs: tuple
     for index, dof in enumerate(dofs):
         for axis, row in make_shift_rows(basis.model, dof).items():
             if axis in nuisance_prior.axes:
-                rows[index, nuisance_prior.axes.index(axis)] = row @ basis.vectors
+                weighted = np.flatnonzero(row)
+                rows[index, nuisance_prior.axes.index(axis)] = row[weighted] @ basis.vectors[weighted]
     return rows
