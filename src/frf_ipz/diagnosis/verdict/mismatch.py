@@ -15,7 +15,7 @@ import pandas as pd
 from frf_ipz.diagnosis.evidence.inference_problem import compute_weights
 from frf_ipz.diagnosis.model.response import nuisance_jacobian
 from frf_ipz.diagnosis.result import Curves
-from frf_ipz.diagnosis.search.global_scan import evaluate_receptances
+from frf_ipz.diagnosis.search.global_scan import MOTIONS_AT_ONCE, evaluate_receptances
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -127,13 +127,15 @@ def _compute_misfits(problem: InferenceProblem, null: Fit, motions: Sequence[Mot
     gains = problem.sparse_data.gains(response) if is_on_fit else 1.0
     weights = compute_weights(data, ERROR)
     misfit = data.values - gains * response.values
-    no_missing_flexibility = np.zeros(len(motions))
-    across = evaluate_receptances(
-        response, null.hypothesis.basis, problem.context.layout, motions, no_missing_flexibility
-    ).across
-    products = np.einsum("kf,kfp->kp", weights * misfit.conj(), across)
-    size = np.einsum("kf,kfp->kp", weights, np.abs(across) ** 2)
     before = np.sum(weights * np.abs(misfit) ** 2, axis=1)
-    explained = np.abs(products) ** 2 / np.maximum(size, np.finfo(float).tiny)
-    remaining = np.log1p(np.maximum(before[:, None] - explained, 0.0)).sum(0)
-    return float(np.log1p(before).sum()), np.asarray(remaining)
+    remaining = []
+    for first in range(0, len(motions), MOTIONS_AT_ONCE):
+        some = motions[first : first + MOTIONS_AT_ONCE]
+        across = evaluate_receptances(
+            response, null.hypothesis.basis, problem.context.layout, some, np.zeros(len(some))
+        ).across
+        products = np.einsum("kf,kfp->kp", weights * misfit.conj(), across)
+        size = np.einsum("kf,kfp->kp", weights, np.abs(across) ** 2)
+        explained = np.abs(products) ** 2 / np.maximum(size, np.finfo(float).tiny)
+        remaining.append(np.log1p(np.maximum(before[:, None] - explained, 0.0)).sum(0))
+    return float(np.log1p(before).sum()), np.concatenate(remaining)
