@@ -121,9 +121,21 @@ class _Refinement:
 
     def linearise(self, system: CompressedSystem) -> NormalEquations:
         """Give information and gradient of the poles, residues eliminated: all real parts, then all imaginary parts."""
-        jacobian = pole_jacobian(system)
-        flat = jacobian.reshape(jacobian.shape[0] * jacobian.shape[1], jacobian.shape[2])
-        return NormalEquations(matrix=flat.T @ flat, right=flat.T @ system.z[:, system.n_linear :].ravel())
+        n, n_poles = system.n_linear, system.n_poles
+        # the Jacobian of an FRF is the real part of C times its residues, and minus the imaginary part: so products
+        # of C serve all FRFs of a system
+        C = system.U[:, n:, n : n + n_poles] - 1j * system.U[:, n:, n + n_poles :]
+        residues = system.scaled_residues().reshape(len(C), len(system.z) // len(C), n_poles)
+        rows = system.z[:, n:].reshape(len(C), len(system.z) // len(C), 2 * n_poles)
+        transposed, residues_transposed = C.transpose(0, 2, 1), residues.transpose(0, 2, 1)
+        hermitian = np.sum((transposed.conj() @ C) * (residues_transposed.conj() @ residues), axis=0)
+        symmetric = np.sum((transposed @ C) * (residues_transposed @ residues), axis=0)
+        real, imag = (hermitian.real + symmetric.real) / 2, (hermitian.real - symmetric.real) / 2
+        mixed = -(hermitian.imag + symmetric.imag) / 2
+        gradient = np.sum((rows @ C) * residues, axis=(0, 1))
+        return NormalEquations(
+            matrix=np.block([[real, mixed], [mixed.T, imag]]), right=np.concatenate([gradient.real, -gradient.imag])
+        )
 
     def move(self, system: CompressedSystem, _equations: NormalEquations, step: FloatArray) -> CompressedSystem:
         """Compress the data around the poles that a step leads to."""

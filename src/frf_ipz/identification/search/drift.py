@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.identification.likelihood.compression import CompressedSystem, response
+from frf_ipz.identification.likelihood.compression import CompressedSystem, model_columns, response
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, pole_jacobian, refine_poles
 from frf_ipz.identification.measured_lines import WeightedLines
+from frf_ipz.numerics.partial_fractions import unstacked
 
 if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
@@ -24,6 +25,7 @@ ROUNDS = 8
 CONVERGED = 0.3  # standard deviations
 MAX_DRIFT = 2e-3  # a larger change is no drift but another structure
 MIN_EXPLAINED = 0.3  # part of the excess misfit that the factors must explain
+PREDICTED = 0.1  # of that the first step must predict: too little, where the drift exceeds a peak's width
 ITERATIONS = 6
 
 
@@ -72,7 +74,9 @@ def find_drift(
         return None
     step, std = frequency_changes(fit.system)
     penalty = n_frfs * np.log(2 * data.receptance.size)
-    if np.sum((step / std) ** 2) < penalty:
+    excess = max(fit.misfit - 2 * data.receptance.size, 1.0)
+    predicted = np.sum((step / std) ** 2)
+    if predicted < max(penalty, PREDICTED * MIN_EXPLAINED * excess):
         return None
     change, best, receptance = np.zeros(n_frfs), fit, data.receptance
     for _ in range(ROUNDS):
@@ -89,7 +93,6 @@ def find_drift(
             step = step - np.average(step, weights=std**-2)
         if np.all(np.abs(step) < CONVERGED * std):
             break
-    excess = max(fit.misfit - 2 * data.receptance.size, 1.0)
     gain = fit.misfit - best.misfit
     if gain < penalty or gain < MIN_EXPLAINED * excess:
         return None
@@ -99,10 +102,12 @@ def find_drift(
 def _at_mean_frequencies(
     data: WeightedLines, system: CompressedSystem, terms: SmoothTerms, relative_change: FloatArray
 ) -> ComplexArray:
-    receptance = data.receptance + response(system, terms, data.s)
-    for frf, change in enumerate(relative_change):
-        receptance[:, frf] -= response(system, terms, data.s / (1 + change))[:, frf]
-    return receptance
+    coefficients = system.coefficients()
+    moved = [
+        unstacked(model_columns(data.s / (1 + change), system.poles, terms, real_modes=system.real_modes) @ of_frf)
+        for change, of_frf in zip(relative_change.tolist(), coefficients, strict=True)
+    ]
+    return np.asarray(data.receptance + response(system, terms, data.s) - np.stack(moved, axis=1))
 
 
 def frequency_changes(system: CompressedSystem) -> tuple[FloatArray, FloatArray]:
