@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from frf_ipz.arguments import as_path, require_each, require_type
 from frf_ipz.diagnosis.catalogue.effect import Effect
@@ -56,6 +55,7 @@ from frf_ipz.diagnosis.verdict.unnamed_force import describe_unnamed_force, find
 from frf_ipz.frf import FrfSet
 from frf_ipz.ingest.campaign import VibrationTest
 from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.progress import silent
 from frf_ipz.structure import StructuralModel
 
@@ -168,6 +168,7 @@ def diagnose(
     )
 
 
+@on_one_thread
 def find_causes(
     fe_model: StructuralModel,
     observations: Observations,
@@ -199,10 +200,9 @@ def find_causes(
     Diagnosis
         Verdict, findings and proof.
     """
-    with threadpool_limits(limits=1, user_api="blas"):  # on small matrices threads only wait for each other
-        diagnosis = _diagnose(
-            fe_model, observations, catalogue, deadline, progress, only_where_they_differ=only_where_they_differ
-        )
+    diagnosis = _diagnose(
+        fe_model, observations, catalogue, deadline, progress, only_where_they_differ=only_where_they_differ
+    )
     if catalogue.options.seed is None:
         return diagnosis
     return replace(diagnosis, warnings=(*diagnosis.warnings, SEED_WARNING))

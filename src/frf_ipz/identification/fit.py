@@ -45,12 +45,14 @@ from frf_ipz.identification.search.split_half import SplitHalf, fit_halves, unco
 from frf_ipz.identification.stabilization import columns_of_modes
 from frf_ipz.identification.stated_modes import take_stated_modes
 from frf_ipz.modes import ModalParameters
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.progress import Progress, silent
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 NOISE_ROUNDS = 3  # of fitting residues and estimating the noise in turn
 
 
+@on_one_thread
 def fit_modes(
     frfs: FrfSet | ModalParameters, *, options: FitOptions | None = None, progress: Progress = silent
 ) -> ModalFit:
@@ -103,6 +105,7 @@ def fit_modes(
     return with_repeated_roots(_as_modal_fit(frfs, fitted, chosen, halves))
 
 
+@on_one_thread
 def fit_residues(frfs: FrfSet, *, poles: ComplexArray, options: FitOptions | None = None) -> ModalFit:
     """Fit residues and zeros to measured FRFs, with given poles.
 

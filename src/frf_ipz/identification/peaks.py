@@ -19,6 +19,7 @@ from frf_ipz.identification.measured_lines import SIGNAL, measured_lines
 from frf_ipz.identification.search.find_modes import FIXED_POLES
 from frf_ipz.identification.search.goodness_of_fit import assess_fit
 from frf_ipz.identification.stabilization import find_start_poles
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ class FrfPeaks:
     band_hz: tuple[float, float]
 
 
+@on_one_thread
 def find_peaks(frfs: FrfSet, options: FitOptions) -> FrfPeaks:
     """Find the modes that make a peak.
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from frf_ipz.arguments import require_type
 from frf_ipz.identification.modal_fit import ModalFit
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.pairing.model_roots import ModelPoles, ModelZeros, model_poles, model_shapes, model_zeros
 from frf_ipz.pairing.pairs import Pair, Pairs, PairVerdict
 from frf_ipz.pairing.poles import PolePairing, pair_poles
@@ -29,6 +30,7 @@ CANCELLING = 3.0  # standard deviations of distance below which a zero and a pol
 NO_ROOT = complex(np.nan, np.nan)
 
 
+@on_one_thread
 def pair_roots(fit: ModalFit, reduced_model: ReducedModel) -> Pairs:
     """Assign measured poles and zeros to those of the model, one to one.
 

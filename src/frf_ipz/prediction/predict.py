@@ -18,6 +18,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel, Measured, require_measured
 from frf_ipz.identification.modal_fit import ModalFit
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.prediction.advice import explain_wide_band, wide_bands
 from frf_ipz.prediction.ensemble import ModelEnsemble
 from frf_ipz.prediction.model_error import as_ensemble, estimate_model_error, frf_rows, frf_sizes
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 BAND = (0.05, 0.95)
 
 
+@on_one_thread
 def predict_frfs(
     measured: Measured,
     updated_model: UpdatedModel,

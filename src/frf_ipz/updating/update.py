@@ -16,6 +16,7 @@ import numpy as np
 from frf_ipz.arguments import require_type
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.identification.modal_fit import ModalFit
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.pairing.pair import pair_roots
 from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.progress import silent
@@ -56,6 +57,7 @@ class Method(Protocol):
         """
 
 
+@on_one_thread
 def update_model(
     fit: ModalFit,
     reduced_model: ReducedModel,
