@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +14,7 @@ from frf_ipz.identification.noise import BLOCK_LINES, misfit_variance, rough_var
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
     from frf_ipz.identification.options import FitOptions
+    from frf_ipz.numerics.line_sums import LineSums
 
 LEAST_COHERENCE = 0.3  # of the median FRF on a line: below, the line says nothing of the structure
 LEAST_NOISE = 1e-6  # of an FRF's own modulus: no measurement is better, and a variance of zero weighs infinitely
@@ -41,6 +42,8 @@ class WeightedLines:
         Weights where profile times gain is not good enough.
     real_modes : bool
         Residues of receptances are imaginary, as those of normal modes.
+    sums : dict
+        What the compression has made of the lines, by the powers and the scale of the smooth terms.
     """
 
     s: ComplexArray
@@ -49,6 +52,9 @@ class WeightedLines:
     gain: FloatArray
     full: FloatArray | None = None
     real_modes: bool = False
+    sums: dict[tuple[tuple[int, ...], float], tuple[LineSums, FloatArray]] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @property
     def is_shared(self) -> bool:

@@ -64,11 +64,100 @@ def pair_columns(s: ComplexArray, p: ComplexArray, power: int = 1) -> FloatArray
     (2 n_lines, 2 n_poles) array
         First all columns of real parts, then all of imaginary parts.
     """
-    rows = np.empty((2, len(p), 2, len(s)))
-    for first in range(0, len(s), LINES_AT_ONCE):
+    return pair_rows(s[None], p, power).reshape(2 * len(p), 2 * len(s)).T
+
+
+def pair_rows(s: ComplexArray, p: ComplexArray, power: int = 1) -> FloatArray:
+    """Give the columns of `pair_columns` as rows, each pole on lines of its own.
+
+    Parameters
+    ----------
+    s : (n_poles or 1, n_lines) complex array
+        Where the response is evaluated: lines of each pole, or of all.
+    p : (n_poles,) complex array
+        One pole of each conjugate pair, in the unit of `s`.
+    power : int
+        1 for the response itself; 2 for its derivative with respect to the poles.
+
+    Returns
+    -------
+    (2, n_poles, 2, n_lines) array
+        For real and imaginary parts of residues; real and imaginary parts of the response.
+    """
+    rows = np.empty((2, len(p), 2, s.shape[1]))
+    for first in range(0, s.shape[1], LINES_AT_ONCE):
         part = slice(first, first + LINES_AT_ONCE)
-        _fill_rows(rows[..., part], s[part], p, power)
-    return rows.reshape(2 * len(p), 2 * len(s)).T
+        _fill_rows(rows[..., part], s[:, part], p, power)
+    return rows
+
+
+def pair_products(p: ComplexArray, values: ComplexArray, slopes: ComplexArray, real_part: float) -> FloatArray:
+    """Products of the columns of poles with one another, from what each pole has in common with a constant.
+
+    With the weights w of lines and ``F(x) = sum w / (s - x)``, the fractions of two poles have the product
+    ``sum w conj(1 / (s - p)) / (s - q) = -(F(q) + conj(F(p))) / (q + conj(p) - 2 Re(s))``: so all products cost as much
+    as one column of each pole, however many lines there are.
+
+    Parameters
+    ----------
+    p : (n_poles,) complex array
+        One pole of each conjugate pair.
+    values, slopes : (..., 2 n_poles) complex array
+        ``F`` at the poles, then at their conjugates, and its derivative.
+    real_part : float
+        Of all lines.
+
+    Returns
+    -------
+    (..., 4 n_poles, 4 n_poles) array
+        Columns of real parts of residues, of imaginary parts, and of the slopes of both.
+    """
+    both = np.concatenate([p, p.conj()])
+    inverse = 1 / (both + both.conj()[:, None] - 2 * real_part)
+    sums = (values[..., None, :] + values.conj()[..., :, None]) * inverse
+    after, before = slopes[..., None, :], slopes.conj()[..., :, None]
+    n = len(p)
+    products = np.empty((*values.shape[:-1], 2, 2, n, 2, 2, n))
+    for row, column, block in (
+        (0, 0, -sums),
+        (0, 1, (sums - after) * inverse),
+        (1, 0, (sums - before) * inverse),
+        (1, 1, (after + before - 2 * sums) * inverse**2),
+    ):
+        a, b, c, d = block[..., :n, :n], block[..., :n, n:], block[..., n:, :n], block[..., n:, n:]
+        part = products[..., row, :, :, column, :, :]
+        part[..., 0, :, 0, :] = (a + b + c + d).real
+        part[..., 0, :, 1, :] = -(a - b + c - d).imag
+        part[..., 1, :, 0, :] = (a + b - c - d).imag
+        part[..., 1, :, 1, :] = (a - b - c + d).real
+    return products.reshape(*values.shape[:-1], 4 * n, 4 * n)
+
+
+def pair_error_growth(p: ComplexArray, values: ComplexArray, slopes: ComplexArray, real_part: float) -> FloatArray:
+    """Give the factor by which `pair_products` makes rounding grow, in the products of each pole with itself.
+
+    Parameters
+    ----------
+    p : (n_poles,) complex array
+        One pole of each conjugate pair.
+    values, slopes : (..., 2 n_poles) complex array
+        As for `pair_products`.
+    real_part : float
+        Of all lines.
+
+    Returns
+    -------
+    (..., n_poles) array
+        What is subtracted, over what is left.
+    """
+    distance = 2 * np.abs(p.real - real_part)
+    value, slope = values[..., : len(p)], slopes[..., : len(p)]
+    real = 2 * np.abs(value.real) / distance
+    left = 2 * np.abs(slope.real - np.sign(p.real - real_part) * real) / distance**2
+    subtracted = 2 * (np.abs(slope) + 2 * np.abs(value) / distance) / distance**2
+    tiny = np.finfo(float).tiny
+    of_values = 2 * np.abs(value) / distance / np.maximum(real, tiny)
+    return np.asarray(np.maximum(of_values, subtracted / np.maximum(left, tiny)))
 
 
 def pair_values(s: ComplexArray, p: ComplexArray, residues: ComplexArray) -> ComplexArray:

@@ -14,14 +14,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
-from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
-from frf_ipz.numerics.partial_fractions import pair_columns, stacked, unstacked
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from frf_ipz.numerics.line_sums import LineSums
+from frf_ipz.numerics.partial_fractions import (
+    pair_columns,
+    pair_error_growth,
+    pair_products,
+    pair_rows,
+    stacked,
+    unstacked,
+)
 
 if TYPE_CHECKING:
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
     from frf_ipz.identification.measured_lines import WeightedLines
 
-WORST_PIVOT = 1e-6  # of a unit column: below, the normal equations lose too many digits and QR is taken
+MOST_GROWTH = 1e3  # of rounding in products of a pole's columns from sums: above, they are summed line by line
+WORST_PIVOT = 1e-5  # of a unit column: below, the normal equations lose too many digits and QR is taken
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -130,29 +139,99 @@ def compress(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) -> Co
     CompressedSystem
         The small system.
     """
-    columns = model_columns(data.s, poles, terms, real_modes=data.real_modes, with_slopes=True)
-    if data.is_shared:
-        columns *= np.tile(data.profile, 2)[:, None]
-        rows = stacked(data.receptance * data.profile[:, None]) * data.gain
-        U, z = _reduce(columns, rows)
-        systems, right, total = U[None], z.T, np.einsum("lf,lf->f", rows, rows)
-    else:
-        reduced = [
-            _reduce(columns * np.tile(weight, 2)[:, None], stacked(value * weight)[:, None])
-            for weight, value in zip(data.weight.T, data.receptance.T, strict=True)
-        ]
-        systems = np.stack([U for U, _ in reduced])
-        right = np.stack([z[:, 0] for _, z in reduced])
-        total = np.sum(np.abs(data.receptance * data.weight) ** 2, axis=0)
+    gram, right = _normal_equations(data, poles, terms)
+    reduced = [
+        _factorise(matrix, sides) or _reduce(*_weighted_columns(data, poles, terms, number))
+        for number, (matrix, sides) in enumerate(zip(gram, right, strict=True))
+    ]
     return CompressedSystem(
         poles=poles,
         n_smooth=terms.n_columns,
         real_modes=data.real_modes,
-        U=systems,
-        z=right,
-        total=total,
-        scale=data.gain if data.is_shared else np.ones(len(total)),
+        U=np.stack([U for U, _ in reduced]),
+        z=np.concatenate([z.T for _, z in reduced]),
+        total=np.sum(np.abs(data.receptance * data.weight) ** 2, axis=0),
+        scale=data.gain if data.is_shared else np.ones(data.receptance.shape[1]),
     )
+
+
+def _normal_equations(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) -> tuple[FloatArray, FloatArray]:
+    """Give the products of the weighted columns with one another and with the FRFs: of all together, or of each."""
+    sums, of_powers = _line_sums(data, terms)
+    every = np.concatenate([terms.poles, poles])
+    n_powers, n_systems, n = len(terms.powers), len(of_powers), len(every)
+    products = sums.products(every)
+    n_shared = n_systems * (2 + n_powers)
+    shared = products[..., :n_shared].reshape(4, n, n_systems, 2 + n_powers).transpose(2, 3, 0, 1)
+    alone = shared[:, 0] + 1j * shared[:, 1]  # the sum of a pole and its conjugate, and i times their difference
+    values, slopes = (
+        np.concatenate([alone[:, k] - 1j * alone[:, k + 1], alone[:, k] + 1j * alone[:, k + 1]], axis=1) / 2
+        for k in (0, 2)
+    )
+    gram = np.empty((n_systems, n_powers + 4 * n, n_powers + 4 * n))
+    gram[:, :n_powers, :n_powers] = of_powers[:, :, :n_powers]
+    gram[:, :n_powers, n_powers:] = shared[:, 2:].reshape(n_systems, n_powers, 4 * n)
+    gram[:, n_powers:, :n_powers] = gram[:, :n_powers, n_powers:].transpose(0, 2, 1)
+    gram[:, n_powers:, n_powers:] = pair_products(every, values, slopes, float(data.s[0].real))
+    growth = pair_error_growth(every, values, slopes, float(data.s[0].real)).max(axis=0)
+    lossy = np.flatnonzero(growth > MOST_GROWTH)
+    if len(lossy):  # narrow for the lines, or where lines weigh far less than others
+        s, weights = sums.seen_from(every[lossy])
+        rows = np.concatenate([pair_rows(s[None], every[lossy], power) for power in (1, 2)])
+        rows = rows.reshape(4 * len(lossy), 2 * len(s))
+        places = (n_powers + n * np.arange(4)[:, None] + lossy).ravel()
+        for system, squares in zip(gram, weights[:, 0, : n_shared : 2 + n_powers].T, strict=True):
+            system[np.ix_(places, places)] = (rows * np.tile(squares, 2)) @ rows.T
+    right = np.concatenate(
+        [
+            of_powers[:, :, n_powers:],
+            products[..., n_shared:].reshape(4 * n, n_systems, -1).transpose(1, 0, 2),
+        ],
+        axis=1,
+    )
+    order = _column_order(n_powers, len(terms.poles), n, real_modes=data.real_modes)
+    return gram[:, order[:, None], order], right[:, order]
+
+
+def _column_order(n_powers: int, n_fixed: int, n: int, *, real_modes: bool) -> IntArray:
+    """Places of the columns of `model_columns` among powers and all poles' real parts, imaginary parts and slopes."""
+    parts = n_powers + n * np.arange(4)[:, None] + np.arange(n)
+    residues = parts[1:2, n_fixed:] if real_modes else parts[:2, n_fixed:]
+    return np.concatenate(
+        [np.arange(n_powers), parts[:2, :n_fixed].T.ravel(), residues.ravel(), parts[2:, n_fixed:].ravel()]
+    )
+
+
+def _line_sums(data: WeightedLines, terms: SmoothTerms) -> tuple[LineSums, FloatArray]:
+    """Intervals of the weighted lines, and the products of the powers with powers and FRFs."""
+    key = terms.powers, terms.scale_rad_s
+    if key not in data.sums:
+        profiles = _profiles(data)
+        powers = np.stack([(data.s / terms.scale_rad_s) ** power for power in terms.powers], axis=1)
+        rows = np.concatenate([np.ones((len(powers), 1)), np.full((len(powers), 1), 1j), powers], axis=1)
+        of_systems = profiles[:, :, None] ** 2 * rows[:, None]
+        frfs = data.receptance * profiles**2 * (data.gain if data.is_shared else 1.0)
+        sides = frfs.reshape(len(frfs), profiles.shape[1], -1)
+        with_powers = np.concatenate([of_systems[:, :, 2:], sides], axis=2)
+        of_powers = np.einsum("lp,lgr->gpr", powers.conj(), with_powers).real
+        weighted = np.concatenate([of_systems.reshape(len(frfs), -1), frfs], axis=1)
+        data.sums[key] = LineSums.of_lines(data.s, weighted), of_powers
+    return data.sums[key]
+
+
+def _profiles(data: WeightedLines) -> FloatArray:
+    """Weights of the lines in each system, (n_lines, n_systems)."""
+    return data.profile[:, None] if data.is_shared else data.weight
+
+
+def _weighted_columns(
+    data: WeightedLines, poles: ComplexArray, terms: SmoothTerms, number: int
+) -> tuple[FloatArray, FloatArray]:
+    """Columns and FRFs of one system line by line, where products of columns lose too many digits."""
+    weight = data.profile if data.is_shared else data.weight[:, number]
+    rows = data.receptance * data.gain if data.is_shared else data.receptance[:, [number]]
+    columns = model_columns(data.s, poles, terms, real_modes=data.real_modes, with_slopes=True)
+    return columns * np.tile(weight, 2)[:, None], stacked(rows * weight[:, None])
 
 
 def model_columns(
@@ -254,21 +333,13 @@ def without_lines(
     columns *= np.tile(data.profile[left_out], 2)[:, None]
     rows = stacked(data.receptance[left_out] * data.profile[left_out, None]) * data.gain
     U = system.U[0]
-    length = np.sqrt(np.einsum("ij,ij->j", U, U))
-    gram = (U.T @ U - columns.T @ columns) / length / length[:, None]
-    try:
-        rest = linalg.cholesky(gram, check_finite=False)
-        is_accurate = bool(np.min(np.diag(rest)) > WORST_PIVOT)
-    except linalg.LinAlgError:
-        is_accurate = False
-    if not is_accurate:
+    rest = _factorise(U.T @ U - columns.T @ columns, U.T @ system.z.T - columns.T @ rows)
+    if rest is None:
         kept = ~left_out
         some = replace(data, s=data.s[kept], receptance=data.receptance[kept], profile=data.profile[kept])
         return compress(some, system.poles, terms)
-    right = (U.T @ system.z.T - columns.T @ rows) / length[:, None]
-    z = linalg.solve_triangular(rest, right, trans="T", check_finite=False)
     total = system.total - np.einsum("lf,lf->f", rows, rows)
-    return replace(system, U=(rest * length)[None], z=z.T, total=total)
+    return replace(system, U=rest[0][None], z=rest[1].T, total=total)
 
 
 def solve_upper(U: FloatArray, z: FloatArray) -> FloatArray:
@@ -293,16 +364,20 @@ def solve_upper(U: FloatArray, z: FloatArray) -> FloatArray:
     )
 
 
+def _factorise(gram: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """Triangular factor of normal equations and their right-hand sides; None where too many digits are lost."""
+    length = np.sqrt(np.diagonal(gram))
+    try:
+        U = linalg.cholesky(gram / length / length[:, None], check_finite=False)
+    except linalg.LinAlgError:
+        return None
+    if not np.min(np.diag(U)) > WORST_PIVOT:
+        return None
+    return U * length, linalg.solve_triangular(U, right / length[:, None], trans="T", check_finite=False)
+
+
 def _reduce(columns: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Triangular factor of the columns, and the rows in its orthonormal basis."""
     length = np.sqrt(np.einsum("ij,ij->j", columns, columns))
-    columns = columns / length
-    try:
-        U = linalg.cholesky(columns.T @ columns, check_finite=False)
-        is_accurate = bool(np.min(np.diag(U)) > WORST_PIVOT)
-    except linalg.LinAlgError:
-        is_accurate = False
-    if is_accurate:
-        return U * length, linalg.solve_triangular(U, columns.T @ rows, trans="T", check_finite=False)
-    Q, U = np.linalg.qr(columns)
+    Q, U = np.linalg.qr(columns / length)
     return U * length, Q.T @ rows

@@ -1,0 +1,171 @@
+"""Products of partial fractions with weighted lines, at a cost that hardly grows with the number of lines.
+
+Far from a pole its partial fraction varies little over many lines. So the lines are divided into intervals, these into
+halves, and so on; what an interval's lines weigh is carried to a few Chebyshev nodes, with which a pole far from the
+interval makes the same sums to rounding [Fong2009]. A pole sees large intervals far away, small ones nearby, and single
+lines next to it.
+
+[Fong2009] W. Fong, E. Darve, The black-box fast multipole method, J. Computational Physics 228, 2009, 8712-8725,
+doi:10.1016/j.jcp.2009.08.031.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.numerics.partial_fractions import pair_rows
+
+# seen from this many half lengths, m nodes leave (3 + sqrt(8))^-m: rounding
+FAR = 3.0
+NODES = 18
+LINES_OF_SMALLEST = 128  # of the smallest intervals: fewer would cost more in calls than they save
+ANGLES = (2 * np.arange(NODES) + 1) * np.pi / (2 * NODES)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LineSums:
+    """Weighted rows, by intervals of lines.
+
+    Parameters
+    ----------
+    s : (n_lines,) complex array
+        Lines by ascending frequency, all with the same real part, rad/s.
+    rows : (n_lines, 2, n_rows) array
+        Real and imaginary part of what the fractions are multiplied with.
+    first : (n_intervals + 1,) int array
+        First line of each of the smallest intervals.
+    levels : tuple of (2^k, 2, n_nodes, n_rows) arrays
+        From the whole band to the smallest intervals, what stands for the lines at the nodes of each interval.
+    """
+
+    s: ComplexArray
+    rows: FloatArray
+    first: IntArray
+    levels: tuple[FloatArray, ...]
+
+    @staticmethod
+    def of_lines(s: ComplexArray, rows: ComplexArray) -> LineSums:
+        """Divide lines into intervals.
+
+        Parameters
+        ----------
+        s : (n_lines,) complex array
+            Lines by ascending frequency, all with the same real part, rad/s.
+        rows : (n_lines, n_rows) complex array
+            What the fractions are multiplied with, weights included.
+
+        Returns
+        -------
+        LineSums
+            Of these lines.
+        """
+        depth = int(np.log2(max(1.0, len(s) / LINES_OF_SMALLEST)))
+        count = 2**depth
+        low, length = s.imag[0], (s.imag[-1] - s.imag[0]) / count
+        edges = low + length * np.arange(1, count)
+        first = np.concatenate([[0], np.searchsorted(s.imag, edges), [len(s)]])
+        levels: list[FloatArray] = []
+        if depth:
+            number = np.repeat(np.arange(count), np.diff(first))
+            weights = _interpolation(2 * ((s.imag - low) / length - number) - 1)
+            at = (NODES * number[:, None] + np.arange(NODES)).ravel()
+            to_nodes = sparse.csc_array(
+                (weights.ravel(), at, NODES * np.arange(len(s) + 1)), shape=(NODES * count, len(s))
+            )
+            nodes = [np.asarray(to_nodes @ part).reshape(count, NODES, -1) for part in (rows.real, rows.imag)]
+            levels = [np.stack(nodes, axis=1)]
+            halves = [_interpolation((np.cos(ANGLES) + side) / 2).T for side in (-1, 1)]
+            while len(levels[-1]) > 1:
+                fine = levels[-1]
+                levels.append(halves[0] @ fine[::2] + halves[1] @ fine[1::2])
+        return LineSums(s=s, rows=np.stack([rows.real, rows.imag], axis=1), first=first, levels=tuple(levels[::-1]))
+
+    def products(self, poles: ComplexArray) -> FloatArray:
+        """Multiply the columns of poles, as `pair_columns` gives them, with the rows.
+
+        Parameters
+        ----------
+        poles : (n_poles,) complex array
+            One of each pair, imaginary part >= 0, rad/s.
+
+        Returns
+        -------
+        (4, n_poles, n_rows) array
+            For the real and the imaginary parts of residues, and for those of the slopes.
+        """
+        total = np.zeros((len(poles), 4, self.rows.shape[2]))
+        pole, interval = np.arange(len(poles)), np.zeros(len(poles), np.int64)
+        low, high = self.s[0], self.s[-1]
+        for level in self.levels:
+            half = (high.imag - low.imag) / len(level) / 2
+            middle = low + 1j * half * (2 * interval + 1)
+            is_far = np.abs(poles[pole] - middle) > FAR * half
+            nodes = middle[is_far, None] + 1j * half * np.cos(ANGLES)
+            _add(total, pole[is_far], _columns(nodes, poles[pole[is_far]]), level[interval[is_far]])
+            pole, interval = np.repeat(pole[~is_far], 2), np.repeat(2 * interval[~is_far], 2)
+            interval[1::2] += 1
+        if self.levels:
+            pole, interval = pole[::2], interval[::2] // 2  # the smallest have no halves
+        for number in np.unique(interval[np.diff(self.first)[interval] > 0]).tolist():
+            near, lines = pole[interval == number], slice(self.first[number], self.first[number + 1])
+            columns = _columns(self.s[None, lines], poles[near])
+            rows = self.rows[lines].transpose(1, 0, 2).reshape(-1, total.shape[2])
+            total[near] += (columns.reshape(-1, len(rows)) @ rows).reshape(len(near), 4, -1)
+        return total.transpose(1, 0, 2)
+
+    def seen_from(self, poles: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+        """Give lines next to poles, and nodes that stand for all others.
+
+        Parameters
+        ----------
+        poles : (n_poles,) complex array
+            rad/s.
+
+        Returns
+        -------
+        s : (n,) complex array
+            Lines and nodes, rad/s.
+        rows : (n, 2, n_rows) array
+            Their rows: for sums of whatever varies no faster than products of the poles' columns.
+        """
+        interval, low, band = np.zeros(1, np.int64), self.s[0], self.s[-1].imag - self.s[0].imag
+        places, rows = [], []
+        for level in self.levels:
+            half = band / len(level) / 2
+            middle = low + 1j * half * (2 * interval + 1)
+            is_far = (np.abs(poles - middle[:, None]) > FAR * half).all(axis=1)
+            places.append((middle[is_far, None] + 1j * half * np.cos(ANGLES)).ravel())
+            rows.append(level[interval[is_far]].transpose(0, 2, 1, 3).reshape(len(places[-1]), 2, level.shape[-1]))
+            interval = (2 * interval[~is_far, None] + np.arange(2)).ravel()
+        if self.levels:
+            interval = interval[::2] // 2
+        lines = [slice(self.first[number], self.first[number + 1]) for number in interval.tolist()]
+        return (
+            np.concatenate([*places, *(self.s[part] for part in lines)]),
+            np.concatenate([*rows, *(self.rows[part] for part in lines)]),
+        )
+
+
+def _interpolation(places: FloatArray) -> FloatArray:
+    """Values at places of the polynomials that are one at a node and zero at the others, (n_places, n_nodes)."""
+    order = np.arange(NODES)
+    at_places = np.cos(np.arccos(np.clip(places, -1, 1))[:, None] * order)
+    at_nodes = np.cos(order[:, None] * ANGLES) * np.where(order == 0, 1.0, 2.0)[:, None]
+    return np.asarray(at_places @ at_nodes / NODES)
+
+
+def _columns(s: ComplexArray, poles: ComplexArray) -> FloatArray:
+    """Columns of each pole on lines of its own, (n_poles, 4, 2 n_lines)."""
+    rows = np.concatenate([pair_rows(s, poles, power) for power in (1, 2)])
+    return rows.transpose(1, 0, 2, 3).reshape(len(poles), 4, 2 * s.shape[1])
+
+
+def _add(total: FloatArray, pole: IntArray, columns: FloatArray, charges: FloatArray) -> None:
+    if len(pole):
+        products = columns @ charges.reshape(len(charges), -1, total.shape[2])
+        starts = np.flatnonzero(np.diff(pole, prepend=-1))
+        total[pole[starts]] += np.add.reduceat(products, starts)
