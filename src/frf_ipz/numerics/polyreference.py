@@ -21,6 +21,7 @@ from scipy import linalg
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import IllConditionedError
 
+LINES_AT_ONCE = 4096  # whose intermediate results stay in the cache
 RIDGE = 1e-13  # of the mean diagonal: far above rounding, far below what moves a pole that the data show
 
 
@@ -128,12 +129,20 @@ def participation(D: ComplexArray, z: ComplexArray) -> ComplexArray:
 
 def _moments(theta: FloatArray, columns: ComplexArray, order: int, *, real: bool) -> ComplexArray:
     """Sum over lines of each column times exp(-i theta m), for m from -order to order."""
-    angle = np.outer(np.arange(order + 1), theta)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    even, odd = cosine @ columns.real, sine @ columns.imag
+    even, odd, even_imag, odd_imag = np.zeros((4, order + 1, columns.shape[1]))
+    for first in range(0, len(theta), LINES_AT_ONCE):
+        part = slice(first, first + LINES_AT_ONCE)
+        powers = np.ones((order + 1, len(theta[part])), complex)
+        powers[1:] = np.exp(1j * theta[part])
+        powers = np.cumprod(powers, axis=0)
+        cosine, sine, values = powers.real.copy(), powers.imag.copy(), columns[part]
+        even += cosine @ values.real
+        odd += sine @ values.imag
+        if not real:
+            even_imag += cosine @ values.imag
+            odd_imag += sine @ values.real
     if real:
         return np.concatenate([(even - odd)[:0:-1], even + odd])
-    even_imag, odd_imag = cosine @ columns.imag, sine @ columns.real
     positive = even + odd + 1j * (even_imag - odd_imag)
     negative = even - odd + 1j * (even_imag + odd_imag)
     return np.asarray(np.concatenate([negative[:0:-1], positive]))

@@ -9,6 +9,7 @@ there is only noise, and a candidate is what exceeds the largest value that so m
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -86,15 +87,14 @@ def find_candidates(frequency_hz: FloatArray, misfit: ComplexArray, max_count: i
     gridded = np.zeros((misfit.shape[1], n_grid), np.complex64)  # single precision: the misfit is of order one
     gridded[:, grid_indices] = misfit.T
     signal = np.asarray(fft.ifft(gridded, size, axis=1, norm="forward"), np.complex64)
-    present = np.zeros(n_grid)
-    present[grid_indices] = 1.0
     widths = _half_widths(frequency_hz, line)
     limit = _chance_limit(misfit.shape[1], len(frequency_hz) * len(widths))
     typical = float(stats.chi2.median(2 * misfit.shape[1]))
     levels = np.ones(len(widths))
     matches: list[tuple[float, complex]] = []
+    templates = _template_energies(grid_indices.tobytes(), tuple(widths.tolist()))
     for number, width in enumerate(widths):
-        energy = _match_energy(signal, width, n_grid)[grid_indices] / _template_energy(present, width)[grid_indices]
+        energy = _match_energy(signal, width, n_grid)[grid_indices] / templates[number]
         levels[number] = max(1.0, float(np.median(energy)) / typical)
         ratio = energy / (limit * levels[number])
         matches += [
@@ -134,13 +134,23 @@ def _match_energy(signal: npt.NDArray[np.complex64], width: float, n_grid: int) 
     return np.asarray(np.interp(np.arange(n_grid) / size, np.arange(points) / points, energy))
 
 
-def _template_energy(present: FloatArray, width: float) -> FloatArray:
-    """Sum over the lines present of 1 / (k^2 + width^2)."""
-    reach = int(min(len(present), max(TAILS * width, TAILS)))
+@lru_cache(maxsize=2)  # a search asks for those of the same lines again and again
+def _template_energies(grid_indices: bytes, widths: tuple[float, ...]) -> FloatArray:
+    """Sum over the lines present of 1 / (k^2 + width^2), at each of them, (n_widths, n_lines)."""
+    at = np.frombuffer(grid_indices, np.int64)
+    n_grid = int(at[-1]) + 1
+    reach = int(min(n_grid, max(TAILS * widths[-1], TAILS)))
+    size = fft.next_fast_len(n_grid + 2 * reach)
+    present = np.zeros(n_grid)
+    present[at] = 1.0
+    spectrum = fft.rfft(present, size)
     k = np.arange(-reach, reach + 1)
-    size = fft.next_fast_len(len(present) + 2 * reach)
-    kernel = fft.rfft(1.0 / (k**2 + width**2), size)
-    return np.asarray(fft.irfft(fft.rfft(present, size) * kernel, size)[reach : reach + len(present)])
+    energies = np.empty((len(widths), len(at)))
+    for row, width in zip(energies, widths, strict=True):
+        kernel = np.where(np.abs(k) <= max(TAILS * width, TAILS), 1.0 / (k**2 + width**2), 0.0)
+        row[:] = fft.irfft(spectrum * fft.rfft(kernel, size), size)[reach + at]
+    energies.flags.writeable = False
+    return energies
 
 
 def _chance_limit(n_frfs: int, n_points: int) -> float:
