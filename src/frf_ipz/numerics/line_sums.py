@@ -111,10 +111,10 @@ class LineSums:
         if self.levels:
             pole, interval = pole[::2], interval[::2] // 2  # the smallest have no halves
         for number in np.unique(interval[np.diff(self.first)[interval] > 0]).tolist():
-            near, lines = pole[interval == number], slice(self.first[number], self.first[number + 1])
-            columns = _columns(self.s[None, lines], poles[near])
+            neighbours, lines = pole[interval == number], slice(self.first[number], self.first[number + 1])
+            columns = _columns(self.s[None, lines], poles[neighbours])
             rows = self.rows[lines].transpose(1, 0, 2).reshape(-1, total.shape[2])
-            total[near] += (columns.reshape(-1, len(rows)) @ rows).reshape(len(near), 4, -1)
+            total[neighbours] += (columns.reshape(-1, len(rows)) @ rows).reshape(len(neighbours), 4, -1)
         return total.transpose(1, 0, 2)
 
     def seen_from(self, poles: ComplexArray) -> tuple[ComplexArray, FloatArray]:

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from functools import wraps
 from typing import ParamSpec, TypeVar
 
+from threadpoolctl import threadpool_limits
+
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
@@ -26,9 +28,6 @@ def on_one_thread(stage: Callable[Arguments, Result]) -> Callable[Arguments, Res
 
     @wraps(stage)
     def held(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
-        # imported here: it takes a while, and a command that computes nothing needs none
-        from threadpoolctl import threadpool_limits
-
         with threadpool_limits(limits=1, user_api="blas"):
             return stage(*args, **kwargs)
 

@@ -153,11 +153,11 @@ def pair_error_growth(p: ComplexArray, values: ComplexArray, slopes: ComplexArra
     distance = 2 * np.abs(p.real - real_part)
     value, slope = values[..., : len(p)], slopes[..., : len(p)]
     real = 2 * np.abs(value.real) / distance
-    left = 2 * np.abs(slope.real - np.sign(p.real - real_part) * real) / distance**2
+    remaining = 2 * np.abs(slope.real - np.sign(p.real - real_part) * real) / distance**2
     subtracted = 2 * (np.abs(slope) + 2 * np.abs(value) / distance) / distance**2
-    tiny = np.finfo(float).tiny
-    of_values = 2 * np.abs(value) / distance / np.maximum(real, tiny)
-    return np.asarray(np.maximum(of_values, subtracted / np.maximum(left, tiny)))
+    terms = [(2 * np.abs(value) / distance, real), (subtracted, remaining)]
+    rounding, tiny = np.finfo(float).eps, np.finfo(float).tiny
+    return np.max([term / np.maximum(rest, rounding * term + tiny) for term, rest in terms], axis=0)
 
 
 def pair_values(s: ComplexArray, p: ComplexArray, residues: ComplexArray) -> ComplexArray:
