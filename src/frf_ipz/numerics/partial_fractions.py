@@ -157,7 +157,7 @@ def pair_error_growth(p: ComplexArray, values: ComplexArray, slopes: ComplexArra
     subtracted = 2 * (np.abs(slope) + 2 * np.abs(value) / distance) / distance**2
     terms = [(2 * np.abs(value) / distance, real), (subtracted, remaining)]
     rounding, tiny = np.finfo(float).eps, np.finfo(float).tiny
-    return np.max([term / np.maximum(rest, rounding * term + tiny) for term, rest in terms], axis=0)
+    return np.asarray(np.max([term / np.maximum(rest, rounding * term + tiny) for term, rest in terms], axis=0))
 
 
 def pair_values(s: ComplexArray, p: ComplexArray, residues: ComplexArray) -> ComplexArray:

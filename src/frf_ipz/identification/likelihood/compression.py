@@ -163,11 +163,9 @@ def _normal_equations(data: WeightedLines, poles: ComplexArray, terms: SmoothTer
     products = sums.products(every)
     n_shared = n_systems * (2 + n_powers)
     shared = products[..., :n_shared].reshape(4, n, n_systems, 2 + n_powers).transpose(2, 3, 0, 1)
-    alone = shared[:, 0] + 1j * shared[:, 1]  # the sum of a pole and its conjugate, and i times their difference
-    values, slopes = (
-        np.concatenate([alone[:, k] - 1j * alone[:, k + 1], alone[:, k] + 1j * alone[:, k + 1]], axis=1) / 2
-        for k in (0, 2)
-    )
+    # the sum of a pole and its conjugate, and i times their difference
+    alone: ComplexArray = np.asarray(shared[:, 0] + 1j * shared[:, 1])
+    values, slopes = _at_poles(alone[:, :2]), _at_poles(alone[:, 2:])
     gram = np.empty((n_systems, n_powers + 4 * n, n_powers + 4 * n))
     gram[:, :n_powers, :n_powers] = of_powers[:, :, :n_powers]
     gram[:, :n_powers, n_powers:] = shared[:, 2:].reshape(n_systems, n_powers, 4 * n)
@@ -191,6 +189,12 @@ def _normal_equations(data: WeightedLines, poles: ComplexArray, terms: SmoothTer
     )
     order = _column_order(n_powers, len(terms.poles), n, real_modes=data.real_modes)
     return gram[:, order[:, None], order], right[:, order]
+
+
+def _at_poles(alone: ComplexArray) -> ComplexArray:
+    """Give sums over lines at the poles, then at their conjugates, (n_systems, 2 n)."""
+    together, apart = alone[:, 0], -1j * alone[:, 1]
+    return np.asarray(np.concatenate([together + apart, together - apart], axis=1) / 2, np.complex128)
 
 
 def _column_order(n_powers: int, n_fixed: int, n: int, *, real_modes: bool) -> IntArray:
