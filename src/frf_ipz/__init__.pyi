@@ -110,6 +110,7 @@ from .prediction.agreement import Agreement as Agreement
 from .prediction.agreement import compare_frfs as compare_frfs
 from .prediction.agreement import shift_to_measured_poles as shift_to_measured_poles
 from .prediction.options import PredictOptions as PredictOptions
+from .prediction.predict import band_of_magnitudes as band_of_magnitudes
 from .prediction.predict import predict_frfs as predict_frfs
 from .prediction.prediction import Prediction as Prediction
 from .progress import Progress as Progress
@@ -122,6 +123,8 @@ from .structure import Geometry as Geometry
 from .structure import Part as Part
 from .structure import ReducedModel as ReducedModel
 from .structure import StructuralModel as StructuralModel
+from .updating.expansion import AttachedMass as AttachedMass
+from .updating.expansion import ShapeExpansion as ShapeExpansion
 from .updating.options import UpdateOptions as UpdateOptions
 from .updating.parameters import ParameterBasis as ParameterBasis
 from .updating.parameters import make_structural_basis as make_structural_basis

@@ -30,6 +30,7 @@ Ask: TypeAlias = "Callable[[Evidence], Iterator[Check]]"
 CHECKS: tuple[Ask, ...] = (
     quality.targets,
     agreement.amplitude,
+    agreement.left_out_points,
     agreement.phase,
     agreement.improvement,
     agreement.own_band,

@@ -184,8 +184,8 @@ def population_models(
     share = -(-members // max(len(machines), 1))
     for results in machines:
         updated = results.updated_model
-        if updated is None or results.fit is None:
-            continue
+        if updated is None or results.fit is None or updated.expansion is not None:
+            continue  # a model with expanded shapes has modes of its own
         first = first or results
         mean = _matrices(updated)
         means.append(mean)

@@ -272,7 +272,7 @@ def _flexibility(model: ReducedModel, rows: IntArray) -> FloatArray:
     return np.asarray(((model.expansion[rows] @ shapes[:, flexible]) ** 2 / values[flexible]).sum(axis=1))
 
 
-def describe_modal_change(updated: UpdatedModel) -> Picture:
+def describe_modal_change(updated: UpdatedModel) -> Picture | None:
     """Describe the change of the stiffness that each nominal mode sees.
 
     Parameters
@@ -282,9 +282,11 @@ def describe_modal_change(updated: UpdatedModel) -> Picture:
 
     Returns
     -------
-    Picture
-        Bars.
+    Picture or None
+        Bars; None where measured shapes were expanded, which are no change of the stiffness.
     """
+    if updated.expansion is not None:
+        return None
     values, shapes = eigh(updated.nominal.stiffness, updated.nominal.mass)
     flexible = values > LEAST_EIGENVALUE * values[-1]
     values, shapes = values[flexible][:MOST_MODES], shapes[:, flexible][:, :MOST_MODES]

@@ -13,7 +13,7 @@ Society B 63 (2001) 425-464 (doi:10.1111/1467-9868.00294), for a discrepancy bes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -84,7 +84,8 @@ def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEn
         0 where the ensemble and the noise explain what is missed.
     """
     scale = updated.scale
-    measured = fit.model(s) / (scale.gains(fit.labels) if scale.is_relative else fit.gain)
+    on_time = replace(fit.model, delay_s=np.zeros_like(fit.model.delay_s))  # a model of the structure is never late
+    measured = on_time(s) / (scale.gains(fit.labels) if scale.is_relative else fit.gain)
     centre = as_ensemble(updated, ensemble.lowest_rad_s)
     lines_hz = np.abs(s) / (2 * np.pi)
     power = np.zeros(len(s))

@@ -129,7 +129,7 @@ def _evaluate(model: ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) 
 def band_of_magnitudes(
     measured: Measured, updated_model: UpdatedModel, labels: Sequence[FrfLabel], s: ComplexArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Give the 90 % band of FRFs of an updated model, without the rest of a prediction.
+    """Give the 90 % band of any FRFs of an updated model, without the rest of a prediction.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def band_of_magnitudes(
     updated_model : UpdatedModel
         The updated model.
     labels : sequence of FrfLabel
-        Which FRFs.
+        Which FRFs; they need not be excited where the test excites.
     s : (n_lines,) complex array
         Lines, rad/s; not all 0.
 
@@ -146,7 +146,38 @@ def band_of_magnitudes(
     -------
     low, high : (n_lines, n_frfs) array
         Of the magnitudes; NaN where the method of updating gives no ensemble.
+
+    Raises
+    ------
+    InputError
+        If there is no line above 0, or the model does not know a DOF.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(
+    ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
+    ... )
+    >>> fit = frf_ipz.fit_modes(frfs)
+    >>> updated_model = frf_ipz.update_model(fit, frf_ipz.reduce_model(fit, beam, points=["9:+z"]))
+    >>> label = frf_ipz.FrfLabel(frf_ipz.Dof(6, "z"), frf_ipz.Dof(9, "z"), frf_ipz.FrfQuantity.ACCELERANCE)
+    >>> low, high = frf_ipz.band_of_magnitudes(fit, updated_model, [label], 2j * np.pi * lines)
+    >>> bool(np.all(low <= high))
+    True
     """
+    require_measured(measured)
+    require_type("updated_model", updated_model, UpdatedModel)
+    s = take_array("the lines", s, np.complex128)
+    if not s.any():
+        raise InputError("all lines are 0; at least one above 0 is needed")
     return _magnitude_bands(measured, updated_model, _ensemble(updated_model, s), labels, s)
 
 

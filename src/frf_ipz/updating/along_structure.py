@@ -55,10 +55,12 @@ def change_along_structure(updated: UpdatedModel, fe_model: StructuralModel) -> 
     DataFrame
         One row a part: ``kind, name, nodes`` (as text), ``x_m, y_m, z_m`` of its middle, ``stiffness_ratio`` (updated
         over nominal), ``stiffness_ratio_low, stiffness_ratio_high`` (90 % band; NaN where it is read back). Empty for
-        a model without parts.
+        a model without parts, and where measured shapes were expanded.
     """
     if len(updated.parts):
         return updated.parts
+    if updated.expansion is not None:  # measured shapes are no change of the stiffness
+        return pd.DataFrame(columns=COLUMNS)
     basis = make_structural_basis(fe_model, updated.nominal)
     if not basis.regions:
         return pd.DataFrame(columns=COLUMNS)

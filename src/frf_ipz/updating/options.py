@@ -38,6 +38,9 @@ class UpdateOptions:
         Stop of ``ipz``, eq. (20).
     delta_damping : float
         Stop of ``ipz`` when it changes the damping.
+    expand : bool
+        Where the update stays more than 1 dB off at the measured points, expand the measured shapes over the model in
+        its place, if each point then follows better from the others (minimal-change).
     cross_sensitivities : bool
         Use the off-diagonal blocks of eq. (14) (``ipz``).
     ensemble : int
@@ -63,6 +66,7 @@ class UpdateOptions:
     beta: Positive = 0.3
     delta: NotNegative = 1e-3
     delta_damping: NotNegative = 0.1
+    expand: bool = True
     cross_sensitivities: bool = True
     ensemble: CountOrNone = 200
     seed: Seed = 0

@@ -28,7 +28,8 @@ from frf_ipz.updating.parameters import ParameterBasis, make_structural_basis
 from frf_ipz.updating.position_uncertainty import with_position_uncertainty
 from frf_ipz.updating.problem import UpdateProblem, make_problem
 from frf_ipz.updating.scale import fit_scale
-from frf_ipz.updating.updated_model import UpdatedModel, with_free_rigid_bodies
+from frf_ipz.updating.shape_expansion.expand import with_expanded_shapes
+from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, with_free_rigid_bodies
 
 if TYPE_CHECKING:
     from frf_ipz.progress import Progress
@@ -81,8 +82,8 @@ def update_model(
         Measured poles and zeros with their counterparts; only the paired ones become targets. They are paired here
         where they are left out.
     fe_model : StructuralModel, optional
-        The FE model that was reduced: the stiffness of its parts may then change. Without it and without `basis` the
-        method uses its own generic parameters.
+        The FE model that was reduced: the stiffness of its parts may then change, and masses may be found at its free
+        ends. Without it and without `basis` the method uses its own generic parameters.
     options : UpdateOptions, optional
         Method and its settings.
     basis : ParameterBasis, optional
@@ -143,7 +144,16 @@ def update_model(
     updated = with_free_rigid_bodies(cast("Method", module).update(problem, chosen, progress))
     scaled = _with_scales(updated, fit, paired)
     kept = keep_if_better(scaled, fit)
-    return scaled if kept is scaled else _with_scales(kept, fit, paired)
+    if kept is not scaled:
+        kept = _with_scales(kept, fit, paired)
+    if not chosen.expand or chosen.method != "minimal-change" or kept.status is UpdateStatus.NOTHING_TO_DO:
+        return kept
+    geometry = None if fe_model is None else fe_model.geometry
+    expanded = with_expanded_shapes(kept, fit, problem, geometry=geometry, options=chosen)
+    if expanded.expansion is None:
+        return kept
+    # what is said of a way back to the nominal model does not hold for measured shapes
+    return replace(expanded, status=scaled.status, warnings=(*scaled.warnings, *expanded.expansion.statements))
 
 
 def _with_scales(updated: UpdatedModel, fit: ModalFit, paired: Pairs) -> UpdatedModel:

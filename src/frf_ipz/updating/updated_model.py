@@ -14,6 +14,7 @@ from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.numerics.rigid_motions import meet_no_force, without_force
 from frf_ipz.structure import ReducedModel
+from frf_ipz.updating.expansion import ShapeExpansion
 from frf_ipz.updating.scale import MeasuredScale
 
 UNCERTAIN = (
@@ -83,6 +84,9 @@ class UpdatedModel(Tabulated, Drawn):
     scale, nominal_scale : MeasuredScale
         Gains of the measured FRFs over the updated and the nominal model, where the test does not know its scale;
         else gains of 1 whose draws carry the doubt of the model's mass.
+    expansion : ShapeExpansion, optional
+        What is known of it where `model` holds the measured modes, with their shapes expanded over the nominal model,
+        as no change of its matrices meets the measurement.
 
     Examples
     --------
@@ -120,6 +124,7 @@ class UpdatedModel(Tabulated, Drawn):
     parts: pd.DataFrame = field(default_factory=pd.DataFrame)
     scale: MeasuredScale = field(default_factory=MeasuredScale)
     nominal_scale: MeasuredScale = field(default_factory=MeasuredScale)
+    expansion: ShapeExpansion | None = None
 
     def __repr__(self) -> str:
         counts = f"{len(self.after)} targets, {len(self.history)} iterations"

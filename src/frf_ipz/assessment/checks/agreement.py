@@ -61,6 +61,39 @@ def amplitude(evidence: Evidence) -> Iterator[Check]:
     )
 
 
+def left_out_points(evidence: Evidence) -> Iterator[Check]:
+    """Ask how well measured points follow from each other, where measured shapes stand in the place of an update.
+
+    Such a model has what was measured, so that it agrees with that in any case. It takes care at best: what the model
+    of the structure lacks is not explained.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where shapes were expanded.
+    """
+    expansion = evidence.updated_model.expansion
+    if expansion is None:
+        return
+    after = expansion.median_db
+    is_no_use = judge(after, SIXTH * GAIN_MARGIN_DB, HALF * GAIN_MARGIN_DB) is Verdict.NOT_USABLE
+    yield Check(
+        name="measured points left out",
+        verdict=Verdict.NOT_USABLE if is_no_use else Verdict.WITH_CARE,
+        figure=after,
+        limit=HALF * GAIN_MARGIN_DB,
+        unit="dB",
+        says=f"the model has the measured shapes, expanded, as no change of its matrices meets them: each measured "
+        f"point, left out in turn, follows from the others to {after:.2g} dB (median)",
+        advice="find what the model lacks: see the notes of the update, and frf-ipz diagnose",
+    )
+
+
 def phase(evidence: Evidence) -> Iterator[Check]:
     """Compare the phases, the sign among them.
 

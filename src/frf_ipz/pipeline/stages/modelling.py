@@ -182,6 +182,7 @@ def update(
             modal_fit,
             reduced,
             pairs=pairs,
+            fe_model=model,
             options=options,
             basis=basis,
             position_uncertainty=propagate_position_tolerance(

@@ -1,0 +1,135 @@
+"""What is said of measured shapes that were expanded over a model in the place of an update of its matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
+
+MOST_NAMED = 4
+FEWEST = 5  # points among which one may stand out
+APART = 4.0  # standard deviations of the others, by their median deviation
+NORMAL = 1.4826  # standard deviation over median deviation
+LEAST = 0.05  # of a gain: less is what calibrations promise
+TOLD = 0.1  # of a mass, at the low end of its interval: else the data do not tell it from none
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AttachedMass:
+    """A mass that the model lacks.
+
+    Parameters
+    ----------
+    place : str
+        The DOF.
+    mass_kg, low_kg, high_kg : float
+        Most likely, and its 90 % interval, kg.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.AttachedMass(place="1:z", mass_kg=0.010, low_kg=0.009, high_kg=0.012).text
+    '10 g (9 to 12) at 1:z'
+    """
+
+    place: str
+    mass_kg: float
+    low_kg: float
+    high_kg: float
+
+    @property
+    def text(self) -> str:
+        """Mass with its interval and its place."""
+        mass, low, high = (f"{1e3 * value:.2g}" for value in (self.mass_kg, self.low_kg, self.high_kg))
+        return f"{mass} g ({low} to {high}) at {self.place}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShapeExpansion:
+    """Measured shapes that were expanded over a model, and how well each measured point follows from the others.
+
+    Parameters
+    ----------
+    points : tuple of str
+        Measured points, each left out in turn.
+    ratio : (n_points,) array
+        Measured over predicted amplitude of each, the median over its modes.
+    error_db : (n_points,) array
+        How far off its FRFs are then: median over lines, dB; where the scale is unknown, after one factor a point.
+    updated_error_db : (n_points,) array
+        The same of the updated model, which was given all points.
+    stiffness_ratio : float
+        Factor on the stiffness of the model over which they were expanded.
+    masses : tuple of AttachedMass
+        Masses that were added to it.
+    split : tuple of tuple of float
+        Frequencies of measured modes, Hz, that follow one mode of the model: something hidden splits it.
+    is_level_known : bool
+        Whether the test knows its scale.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> expansion = frf_ipz.ShapeExpansion(
+    ...     points=("10:z", "30:z", "50:z"), ratio=np.ones(3), error_db=np.array([1.0, 1.2, 1.4]),
+    ...     updated_error_db=np.full(3, 4.0), stiffness_ratio=0.97, masses=(), split=((289.0, 377.0),),
+    ...     is_level_known=False,
+    ... )
+    >>> float(expansion.median_db)
+    1.2
+    """
+
+    points: tuple[str, ...]
+    ratio: FloatArray
+    error_db: FloatArray
+    updated_error_db: FloatArray
+    stiffness_ratio: float
+    masses: tuple[AttachedMass, ...]
+    split: tuple[tuple[float, ...], ...]
+    is_level_known: bool
+
+    @property
+    def median_db(self) -> float:
+        """Median over the points."""
+        return float(np.median(self.error_db))
+
+    @property
+    def statements(self) -> tuple[str, ...]:
+        """What was done and found, for people."""
+        worst = int(np.argmax(self.error_db))
+        texts = [
+            f"the update of the matrices is {np.median(self.updated_error_db):.2g} dB off at the measured points "
+            "(median), so the measured shapes were expanded over the model in its place: with each point left out in "
+            f"turn, its FRFs follow from the others to {self.median_db:.2g} dB (median; worst {self.points[worst]} "
+            f"with {self.error_db[worst]:.2g} dB)"
+        ]
+        told = [mass.text for mass in self.masses if mass.low_kg > TOLD * mass.mass_kg]
+        if told:
+            texts.append(
+                "measured shapes and frequencies ask for masses that the model lacks (90 % interval): "
+                f"{', '.join(told)}; and for {100 * (self.stiffness_ratio - 1):+.2g} % of stiffness"
+            )
+        texts += self._points_apart()
+        if self.split:
+            groups = "; ".join(", ".join(f"{hz:.4g}" for hz in group) for group in self.split[:MOST_NAMED])
+            texts.append(
+                f"several measured modes have the shape of one mode of the model: {groups} Hz; what splits it is not "
+                "in the model, and is not named"
+            )
+        return tuple(texts)
+
+    def _points_apart(self) -> list[str]:
+        """Name the points whose amplitudes disagree with what all others imply."""
+        if not self.is_level_known or len(self.points) < FEWEST:
+            return []
+        logs = np.log(self.ratio) - np.median(np.log(self.ratio))
+        scatter = NORMAL * float(np.median(np.abs(logs)))
+        apart = np.flatnonzero(np.abs(logs) > np.maximum(APART * scatter, LEAST))
+        return [
+            f"what was measured at {self.points[place]} is {100 * abs(np.expm1(logs[place])):.0f} % "
+            f"{'low' if logs[place] < 0 else 'high'} in all its modes against what the other points imply, which "
+            f"scatter by {100 * scatter:.1g} %: look at the gain of that file"
+            for place in apart.tolist()
+        ]

@@ -1,0 +1,178 @@
+"""Masses at ends and transducers, found before any pairing: by how well measured shapes then follow modes of the model.
+
+The evidence is that of the directions of the measured shapes in the field of `random_forces`, times that of their
+frequencies: a measured mode lies within a scatter of the modes that its shape is made of, or it is one that the model
+does not have. Neither needs to know which mode belongs to which. The unknowns are one factor on the stiffness, the
+masses, the scatter, and the error of the measured amplitudes; each has a prior, so that what the data do not tell
+stays small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import optimize
+
+from frf_ipz.dofs import TRANSLATIONS, AnyDof, Dof
+from frf_ipz.updating.expansion import AttachedMass
+from frf_ipz.updating.shape_expansion.random_forces import ModalModel, expand_shape
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.structure import Geometry, ReducedModel
+    from frf_ipz.updating.shape_expansion.measured_shapes import MeasuredShapes
+
+STIFFNESS_STD = 0.05  # of the logarithm: 3 % of a modulus over density, and 2 % of a thickness, which counts twice
+SHARE_STD = 0.3  # of the mass that a mode has at the place: what is attached is the smaller part
+LIKELY_ERROR, ERROR_STD = 0.1, 1.0  # of the measured amplitudes; median, and std of the logarithm
+STRANGE = 0.05  # probability that a measured mode is none of the model's
+SCATTERS = (0.1, 0.03)  # of the logarithms of frequencies, to start from: what a drawing promises, a good model
+SCATTER_STD = 1.5  # of the logarithm of the scatter, about the last of these
+SWEEPS = 3  # over all unknowns for each start
+MOST_PLACES = 8
+STEP = 0.05  # of a logarithm, over which the curvature of the evidence is taken
+Q90 = 1.645
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LoadedModel:
+    """A reduced model with the masses that were found.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        With them.
+    stiffness_ratio : float
+        Over that of the model before.
+    masses : tuple of AttachedMass
+        What was found.
+    error : float
+        Relative error of the measured amplitudes.
+    """
+
+    model: ReducedModel
+    stiffness_ratio: float
+    masses: tuple[AttachedMass, ...]
+    error: float
+
+
+def attachment_places(model: ReducedModel, measured: MeasuredShapes, geometry: Geometry | None) -> tuple[AnyDof, ...]:
+    """Choose where things may be attached: at free ends of lines, and at the transducers that stay in place.
+
+    Of sensors and excited DOFs the side with fewer stays, as a roving hammer or sensor leaves nothing behind.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model.
+    measured : MeasuredShapes
+        Names the sensors and excited DOFs.
+    geometry : Geometry, optional
+        Nodes and the lines between them.
+
+    Returns
+    -------
+    tuple of Dof or PortDof
+        Unsigned; none where there are more than can be told apart.
+    """
+    staying = measured.outputs if len(measured.outputs) < len(measured.inputs) else measured.inputs
+    places = [dof.unsigned for dof in staying]
+    directions = {dof.direction for dof in places if isinstance(dof, Dof)} & set(TRANSLATIONS)
+    if geometry is not None and len(geometry.lines):
+        nodes, counts = np.unique(np.asarray(geometry.lines), return_counts=True)
+        ends = [Dof(int(node), direction) for node in nodes[counts == 1] for direction in sorted(directions)]
+        places = [*[dof for dof in ends if dof in model.expanded_dofs], *places]
+    chosen = tuple(dict.fromkeys(places))
+    return chosen if len(chosen) <= MOST_PLACES else ()
+
+
+def find_attached_masses(model: ReducedModel, measured: MeasuredShapes, places: tuple[AnyDof, ...]) -> LoadedModel:
+    """Find masses by the evidence of measured frequencies and shapes.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model without them.
+    measured : MeasuredShapes
+        What was measured.
+    places : tuple of Dof or PortDof
+        Where there may be one.
+
+    Returns
+    -------
+    LoadedModel
+        The most likely masses; the model as it is but for the factor on its stiffness where there is no place.
+    """
+    rows = np.array([model.row(place) for place in places]).reshape(len(places), len(model.mass))
+    felt = len(model.mass) / np.einsum("ij,jk,ik->i", rows, np.linalg.inv(model.mass), rows)
+    count = len(places)
+    typical = np.concatenate([[0.0], np.zeros(count), np.log([LIKELY_ERROR, SCATTERS[-1]])])
+    deviations = np.array([STIFFNESS_STD, *[1.0] * count, ERROR_STD, SCATTER_STD])
+
+    def masses_of(unknowns: FloatArray) -> FloatArray:
+        return np.asarray(SHARE_STD * felt * np.abs(unknowns[1 : 1 + count]))
+
+    def loaded(unknowns: FloatArray) -> ReducedModel:
+        added = (rows.T * masses_of(unknowns)) @ rows
+        return replace(model, mass=model.mass + added, stiffness=np.exp(unknowns[0]) * model.stiffness)
+
+    def cost(unknowns: FloatArray) -> float:
+        modal, (error, scatter) = ModalModel.of(loaded(unknowns), measured), np.exp(unknowns[1 + count :])
+        prior = 0.5 * float(np.sum(((unknowns - typical) / deviations) ** 2))
+        return prior - _log_evidence(modal, measured, float(error), float(scatter))
+
+    best = typical + np.concatenate([[0.0], np.ones(count), [0.0, 0.0]])
+    for scatter in SCATTERS:
+        start = np.concatenate([best[:-1], [np.log(scatter)]])
+        best = optimize.minimize(cost, start, method="Powell", options={"maxiter": SWEEPS}).x
+    best[1 : 1 + count] = np.abs(best[1 : 1 + count])
+    std = _deviations(cost, best, deviations)
+    low, middle, high = (masses_of(np.maximum(best + width * std, 0.0)) for width in (-Q90, 0.0, Q90))
+    masses = [
+        AttachedMass(place=place.name, mass_kg=float(mass), low_kg=float(least), high_kg=float(most))
+        for place, mass, least, most in zip(places, middle, low, high, strict=True)
+    ]
+    return LoadedModel(
+        model=loaded(best),
+        stiffness_ratio=float(np.exp(best[0])),
+        masses=tuple(masses),
+        error=float(np.exp(best[-2])),
+    )
+
+
+def _log_evidence(model: ModalModel, measured: MeasuredShapes, error: float, scatter: float) -> float:
+    """Logarithm of the probability of all directions and frequencies."""
+    elastic = model.omega > 0
+    elastic &= model.omega > 1e-3 * measured.omega.min()
+    total = 0.0
+    for mode, omega in enumerate(measured.omega):
+        shape = expand_shape(model, measured, mode, error)
+        shares = shape.amplitudes**2 / np.sum(shape.amplitudes**2)
+        distance = np.log(omega / model.omega[elastic]) / scatter
+        density = float(shares[elastic] @ np.exp(-0.5 * distance**2)) / scatter
+        total += shape.log_evidence + float(np.log(density + STRANGE))
+    return total
+
+
+def _deviations(cost: Callable[[FloatArray], float], best: FloatArray, prior: FloatArray) -> FloatArray:
+    """Give standard deviations by the curvature; no more than those of the prior."""
+    count = len(best)
+    steps = STEP * np.eye(count)
+    middle = cost(best)
+    hessian = np.zeros((count, count))
+    for row in range(count):
+        for column in range(row + 1):
+            plus, minus = best + steps[row], best - steps[row]
+            if row == column:
+                value = cost(plus) - 2 * middle + cost(minus)
+            else:
+                other = steps[column]
+                value = (cost(plus + other) - cost(plus - other) - cost(minus + other) + cost(minus - other)) / 4
+            hessian[row, column] = hessian[column, row] = value / STEP**2
+    values, vectors = np.linalg.eigh(hessian * np.outer(prior, prior))
+    covariance = (vectors / np.maximum(values, 1.0)) @ vectors.T
+    return np.asarray(prior * np.sqrt(np.diag(covariance)))

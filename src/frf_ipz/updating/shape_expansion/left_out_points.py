@@ -1,0 +1,214 @@
+"""How well measured points are predicted from the others: each is left out of the expansion in turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.arrays import BoolArray, FloatArray
+from frf_ipz.pairing.poles import measured_amplitudes
+from frf_ipz.updating.shape_expansion.expanded_model import expand_modes, receptance
+from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import ComplexArray
+    from frf_ipz.dofs import AnyDof
+    from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.structure import ReducedModel
+    from frf_ipz.updating.updated_model import UpdatedModel
+
+LINES = 300  # of the band, at equal ratios
+FEWEST = 3  # points of a side: of two, one alone would tell the other's shape
+MOST = 12  # points left out, evenly over the side
+MEDIAN_SQUARE = 0.4549  # of a standard normal number
+COVERED = 0.9  # of the points: what is off at a point is so in all its modes, so that a point is one example
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LeftOutPoints:
+    """Errors at measured points, each predicted from the others.
+
+    Parameters
+    ----------
+    points : tuple of Dof or PortDof
+        Sensors, or excited DOFs: the side that has more.
+    error_db : (n_points,) array
+        Median over lines and FRFs, after one factor a point where the scale of the test is unknown.
+    log_ratio : (n_points,) array
+        Logarithm of measured over predicted amplitude, the median over the modes.
+    calibration : float
+        Errors of the shapes over their stated standard deviations, so that it holds at 90 % of the points.
+    """
+
+    points: tuple[AnyDof, ...]
+    error_db: FloatArray
+    log_ratio: FloatArray
+    calibration: float
+
+
+def side_with_more(fit: ModalFit) -> tuple[AnyDof, ...]:
+    """Name the points of the side of a test that has more of them.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The test.
+
+    Returns
+    -------
+    tuple of Dof or PortDof
+        Sensors or excited DOFs; sensors where there are as many.
+    """
+    outputs, inputs = (
+        tuple(dict.fromkeys(dofs))
+        for dofs in ([label.output_dof for label in fit.labels], [label.input_dof for label in fit.labels])
+    )
+    return outputs if len(outputs) >= len(inputs) else inputs
+
+
+def leave_points_out(fit: ModalFit, model: ReducedModel, *, error: float) -> LeftOutPoints | None:
+    """Predict each measured point from the others.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model of all FRFs.
+    model : ReducedModel
+        The model over which shapes are expanded.
+    error : float
+        Relative error of the measured amplitudes.
+
+    Returns
+    -------
+    LeftOutPoints or None
+        None where there are too few points.
+    """
+    points = side_with_more(fit)
+    if len(points) < FEWEST:
+        return None
+    chosen = [points[place] for place in np.unique(np.linspace(0, len(points) - 1, MOST).round().astype(int))]
+    s = _lines(fit)
+    measured = fit.model(s)
+    judged = {point: _judge(fit, model, point, error, s, measured) for point in chosen}
+    known = {point: judgement for point, judgement in judged.items() if judgement is not None}
+    if not known:
+        return None
+    squares = [float(np.median(judgement.squares)) / MEDIAN_SQUARE for judgement in known.values()]
+    return LeftOutPoints(
+        points=tuple(known),
+        error_db=np.array([judgement.error_db for judgement in known.values()]),
+        log_ratio=np.array([judgement.log_ratio for judgement in known.values()]),
+        calibration=float(np.sqrt(np.quantile(squares, COVERED, method="higher"))),
+    )
+
+
+def errors_at_points(fit: ModalFit, updated: UpdatedModel) -> FloatArray:
+    """Give the errors of an updated model at the points that it was given.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model of all FRFs.
+    updated : UpdatedModel
+        With its scale.
+
+    Returns
+    -------
+    (n_points,) array
+        As `LeftOutPoints` has them, dB.
+    """
+    points, s = side_with_more(fit), _lines(fit)
+    measured, computed = fit.model(s), updated.compute_frfs(fit.labels, s)
+    columns = [
+        [number for number, label in enumerate(fit.labels) if point in (label.output_dof, label.input_dof)]
+        for point in points
+    ]
+    is_known = fit.unknown_scale == "none"
+    return np.array(
+        [median_error_db(measured[:, frfs], computed[:, frfs], is_level_known=is_known) for frfs in columns]
+    )
+
+
+def _lines(fit: ModalFit) -> ComplexArray:
+    low = max(fit.band_hz[0], float(fit.frequency_hz[fit.frequency_hz > 0][0]))
+    return np.asarray(2j * np.pi * np.geomspace(low, fit.band_hz[1], LINES))
+
+
+def median_error_db(measured: ComplexArray, predicted: ComplexArray, *, is_level_known: bool) -> float:
+    """Give the median difference of magnitudes.
+
+    Parameters
+    ----------
+    measured, predicted : (n_lines, n_frfs) complex array
+        FRFs of one point.
+    is_level_known : bool
+        Where it is not, one factor is free: the median of the ratios.
+
+    Returns
+    -------
+    float
+        dB.
+    """
+    difference = 20 * np.log10(np.abs(predicted) / np.abs(measured))
+    if not is_level_known:
+        difference = difference - np.median(difference)
+    return float(np.median(np.abs(difference)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Judgement:
+    """A point predicted from the others: error, logarithm of a ratio, squared errors of shapes over their variance."""
+
+    error_db: float
+    log_ratio: float
+    squares: FloatArray
+
+
+def _judge(
+    fit: ModalFit, model: ReducedModel, point: AnyDof, error: float, s: ComplexArray, measured: ComplexArray
+) -> _Judgement | None:
+    """Predict a point from the others; None where they do not tell it."""
+    is_output = any(label.output_dof == point for label in fit.labels)
+    ends = [
+        (label.output_dof, label.input_dof) if is_output else (label.input_dof, label.output_dof)
+        for label in fit.labels
+    ]
+    others = measured_shapes(fit, kept=_kept(ends, point))
+    if others is None:
+        return None
+    is_known = fit.unknown_scale == "none"
+    modes = expand_modes(model, others, error=error, is_scale_known=is_known)
+    row = model.row(point) @ modes.model.shapes
+    at_point = np.array([row @ shape.amplitudes for shape in modes.shapes])
+    variance = np.array([row @ shape.covariance @ row for shape in modes.shapes])
+    opposite = others.inputs if is_output else others.outputs
+    frfs = [number for number, (end, partner) in enumerate(ends) if end == point and partner in opposite]
+    if not frfs:
+        return None
+    predicted, at_partners = [], []
+    for number in frfs:
+        partner, place = ends[number][1], opposite.index(ends[number][1])
+        at_partner = np.array(
+            [shape.sign * (shape.at_inputs if is_output else shape.at_outputs)[place] for shape in modes.shapes]
+        )
+        rest = row * (model.row(partner) @ modes.model.shapes)
+        predicted.append(receptance(modes, at_point, at_partner, rest, s) * s ** fit.labels[number].quantity.power)
+        at_partners.append(at_partner)
+    amplitudes = (measured_amplitudes(fit)[0].real / (fit.gain if is_known else 1.0))[:, frfs]
+    partners = np.stack(at_partners, axis=1)
+    shape = np.sum(amplitudes * partners, axis=1) / np.maximum(np.sum(partners**2, axis=1), np.finfo(float).tiny)
+    large = np.abs(at_point) >= np.median(np.abs(at_point))
+    return _Judgement(
+        error_db=median_error_db(measured[:, frfs], np.stack(predicted, axis=1), is_level_known=is_known),
+        log_ratio=float(np.median(np.log(np.abs(shape[large] / at_point[large])))),
+        squares=(shape - at_point) ** 2 / variance,
+    )
+
+
+def _kept(ends: list[tuple[AnyDof, AnyDof]], point: AnyDof) -> BoolArray:
+    """FRFs without a point; what it does on the other side is left out too where others are there."""
+    there = np.array([end != point for end, _ in ends], bool)
+    nowhere = there & np.array([partner.unsigned != point.unsigned for _, partner in ends], bool)
+    return nowhere if nowhere.any() else there

@@ -1,0 +1,126 @@
+"""Shapes of measured modes at sensors and excited DOFs, from the residues of all FRFs.
+
+The residue matrix of a normal mode has rank one: it is the shape at the sensors times that at the excited DOFs. Only
+the product shows; how its size divides between the two is left to the model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.pairing.poles import measured_amplitudes
+from frf_ipz.rational import damping_ratio
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+    from frf_ipz.dofs import AnyDof
+    from frf_ipz.identification.modal_fit import ModalFit
+
+ROUNDS = 50  # of filling in FRFs that were not measured and taking the leading product in turn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeasuredShapes:
+    """Modes as products of a shape at the sensors and one at the excited DOFs.
+
+    Parameters
+    ----------
+    outputs, inputs : tuple of Dof or PortDof
+        Sensors and excited DOFs, with their signs.
+    poles : (n_modes,) complex array
+        rad/s.
+    size : (n_modes,) array
+        Size of the amplitudes of a mode, in the unit of the measurement over kg.
+    at_outputs : (n_modes, n_outputs) array
+        Directions, of norm 1.
+    at_inputs : (n_modes, n_inputs) array
+        Directions, of norm 1.
+    noise : (n_modes,) array
+        Relative variance of the amplitudes of a mode.
+    """
+
+    outputs: tuple[AnyDof, ...]
+    inputs: tuple[AnyDof, ...]
+    poles: ComplexArray
+    size: FloatArray
+    at_outputs: FloatArray
+    at_inputs: FloatArray
+    noise: FloatArray
+
+    @property
+    def omega(self) -> FloatArray:
+        """(n_modes,) natural frequencies, rad/s."""
+        return np.asarray(np.abs(self.poles))
+
+    @property
+    def damping(self) -> FloatArray:
+        """(n_modes,) damping ratios."""
+        return damping_ratio(self.poles)
+
+
+def measured_shapes(fit: ModalFit, *, kept: BoolArray | None = None) -> MeasuredShapes | None:
+    """Take the shapes out of a fit.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        Of FRFs.
+    kept : (n_frfs,) bool array, optional
+        FRFs to take them from; all where it is left out.
+
+    Returns
+    -------
+    MeasuredShapes or None
+        None where no FRF remains, or where the FRFs fall in groups that share neither a sensor nor an excited DOF, so
+        that no product relates them.
+    """
+    kept = np.ones(len(fit.labels), bool) if kept is None else kept
+    labels = [label for label, is_kept in zip(fit.labels, kept, strict=True) if is_kept]
+    if not labels or not fit.n_modes:
+        return None
+    outputs = tuple(dict.fromkeys(label.output_dof for label in labels))
+    inputs = tuple(dict.fromkeys(label.input_dof for label in labels))
+    rows = np.array([outputs.index(label.output_dof) for label in labels])
+    columns = np.array([inputs.index(label.input_dof) for label in labels])
+    if not _are_joined(rows, columns):
+        return None
+    amplitudes, std = (values[:, kept] for values in measured_amplitudes(fit))
+    gain = np.abs(fit.gain[kept]) if fit.unknown_scale == "none" else np.ones(len(labels))
+    products = [_leading_product(mode, rows, columns) for mode in (amplitudes / gain).real]
+    return MeasuredShapes(
+        outputs=outputs,
+        inputs=inputs,
+        poles=fit.model.poles[: fit.n_modes],
+        size=np.array([size for size, _, _ in products]),
+        at_outputs=np.array([output for _, output, _ in products]),
+        at_inputs=np.array([force for _, _, force in products]),
+        noise=np.mean((std / gain) ** 2, axis=1) / np.maximum(np.mean(np.abs(amplitudes / gain) ** 2, axis=1), 1e-300),
+    )
+
+
+def _are_joined(rows: IntArray, columns: IntArray) -> bool:
+    """Tell whether every FRF is reached from the first by shared sensors and excited DOFs."""
+    reached: BoolArray = np.arange(len(rows)) == 0
+    for _ in range(len(rows)):
+        shares = np.isin(rows, rows[reached]) | np.isin(columns, columns[reached])
+        if (shares == reached).all():
+            break
+        reached = shares
+    return bool(reached.all())
+
+
+def _leading_product(amplitudes: FloatArray, rows: IntArray, columns: IntArray) -> tuple[float, FloatArray, FloatArray]:
+    """Size and directions of the product that is nearest to the amplitudes of a mode."""
+    shape = rows.max() + 1, columns.max() + 1
+    counts, sums = np.zeros(shape), np.zeros(shape)
+    np.add.at(counts, (rows, columns), 1.0)
+    np.add.at(sums, (rows, columns), amplitudes)
+    is_measured = counts > 0
+    matrix = sums / np.maximum(counts, 1.0)
+    for _ in range(1 if is_measured.all() else ROUNDS):
+        left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
+        matrix = np.where(is_measured, matrix, sizes[0] * np.outer(left[:, 0], right[0]))
+    return float(sizes[0]), left[:, 0], right[0]

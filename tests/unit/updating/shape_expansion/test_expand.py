@@ -1,0 +1,147 @@
+"""Measured shapes stand in for an update where what a model lacks is no change of its matrices."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import frf_ipz
+from frf_ipz.export.state_space import make_state_space
+from frf_testbench.updating.synthetic_fit import TrueModes, simulate_fit
+
+END_KG, TRANSDUCER_KG = 0.010, 0.006
+SENSORS = [frf_ipz.Dof(node, "z") for node in (5, 13, 21, 29, 37)]
+ACTUATORS = [SENSORS[0], SENSORS[2], SENSORS[4]]
+BAND_HZ = (20.0, 500.0)
+
+
+def make_nominal() -> frf_ipz.StructuralModel:
+    return frf_ipz.make_beam(
+        length_m=0.5,
+        width_m=0.02,
+        thickness_m=0.002,
+        youngs_modulus_Pa=200e9,
+        density_kg_m3=8000,
+        elements=40,
+        left="free",
+        right="free",
+        modal_ratio=0.005,
+    )
+
+
+def make_truth(*, resonator_hz: float) -> frf_ipz.StructuralModel:
+    """Masses at ends and actuators, and a resonator beside the middle that no node of the model has."""
+    beam = make_nominal()
+    mass, stiffness = beam.mass.toarray(), beam.stiffness.toarray()
+    for node, added in {1: END_KG, 41: END_KG, **{dof.node: TRANSDUCER_KG for dof in ACTUATORS}}.items():
+        mass[(beam.index(frf_ipz.Dof(node, "z")),) * 2] += added
+    place, hidden, rate = beam.index(frf_ipz.Dof(17, "z")), 0.003, (2 * np.pi * resonator_hz) ** 2
+    mass = np.pad(mass, (0, 1))
+    mass[-1, -1] = hidden
+    stiffness = np.pad(stiffness, (0, 1))
+    for row, column, sign in ((place, place, 1), (-1, -1, 1), (place, -1, -1), (-1, place, -1)):
+        stiffness[row, column] += sign * hidden * rate
+    return frf_ipz.StructuralModel.from_matrices(
+        sparse.csr_array(mass), sparse.csr_array(stiffness), dofs=[*beam.dofs, "99:z"], modal_damping=0.005
+    )
+
+
+def labels_of(outputs: list[frf_ipz.Dof]) -> tuple[frf_ipz.FrfLabel, ...]:
+    return tuple(
+        frf_ipz.FrfLabel(output, force, frf_ipz.FrfQuantity.RECEPTANCE) for output in outputs for force in ACTUATORS
+    )
+
+
+@pytest.fixture(scope="module")
+def left_out():
+    """Fit of all sensors but the fourth, the model reduced, and the true FRFs at the fourth."""
+    truth = TrueModes(make_truth(resonator_hz=180.0), np.full(60, 0.005))
+    kept = [dof for dof in SENSORS if dof != SENSORS[3]]
+    fit = simulate_fit(truth, labels_of(kept), BAND_HZ, rng=np.random.default_rng(5))
+    lines = np.linspace(*BAND_HZ, 400)
+    labels = labels_of([SENSORS[3]])
+    values = np.stack([truth.receptance(2j * np.pi * lines, label) for label in labels], axis=1)
+    reduced_model = frf_ipz.reduce_model(fit, make_nominal(), points=[SENSORS[3]])
+    return fit, reduced_model, labels, lines, values
+
+
+def error_db(updated, labels, lines, values):
+    return float(np.median(np.abs(20 * np.log10(np.abs(updated.compute_frfs(labels, 2j * np.pi * lines) / values)))))
+
+
+@pytest.fixture(scope="module")
+def expanded(left_out):
+    return frf_ipz.update_model(left_out[0], left_out[1], fe_model=make_nominal())
+
+
+def test_a_sensor_is_predicted_where_no_change_of_matrices_meets_the_others(left_out, expanded):
+    fit, _, labels, lines, values = left_out
+    assert error_db(expanded, labels, lines, values) < 0.5
+    low, high = frf_ipz.band_of_magnitudes(fit, expanded, labels, 2j * np.pi * lines)
+    assert np.mean((np.abs(values) >= low) & (np.abs(values) <= high)) > 0.8
+    assert np.median(20 * np.log10(high / low)) < 6.0
+
+
+def test_the_update_alone_is_far_off(left_out):
+    fit, reduced_model, *frfs = left_out
+    options = frf_ipz.UpdateOptions(expand=False, ensemble=0)
+    plain = frf_ipz.update_model(fit, reduced_model, fe_model=make_nominal(), options=options)
+    assert plain.expansion is None
+    assert error_db(plain, *frfs) > 2.0
+
+
+def test_masses_and_a_split_mode_are_named(expanded):
+    found = {mass.place: mass for mass in expanded.expansion.masses}
+    for place in ("1:z", "41:z"):
+        assert found[place].low_kg < END_KG < found[place].high_kg
+    for dof in ACTUATORS:
+        assert found[dof.name].low_kg < TRANSDUCER_KG < found[dof.name].high_kg
+    assert abs(expanded.expansion.stiffness_ratio - 1) < 0.02
+    ((low, high),) = expanded.expansion.split
+    assert low < 180.0 < high
+
+
+def test_an_expanded_model_holds_the_measured_modes(left_out, expanded):
+    fit, reduced_model, *_ = left_out
+    squares = np.linalg.eigvals(np.linalg.solve(expanded.model.mass, expanded.model.stiffness)).real
+    hertz = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+    measured_hz = np.abs(fit.model.poles[: fit.n_modes]) / (2 * np.pi)
+    assert np.abs(hertz[:, None] - measured_hz).min(axis=0).max() < 1e-6 * measured_hz.max()
+    hidden = [dof for dof in expanded.model.dofs if dof.direction == "q"]
+    assert len(hidden) == len(expanded.model.dofs) - len(reduced_model.dofs) > 0
+    assert frf_ipz.predict_frfs(fit, expanded, points=["29:+z"]).values.shape[1] == len(ACTUATORS)
+    assert make_state_space(fit, expanded, points=[frf_ipz.parse_dof("29:+z")]).A.size
+
+
+def test_an_update_that_meets_the_measurement_stays(left_out):
+    """Only the stiffness is off, which an update finds."""
+    stiffer = frf_ipz.make_beam(
+        length_m=0.5,
+        width_m=0.02,
+        thickness_m=0.002,
+        youngs_modulus_Pa=215e9,
+        density_kg_m3=8000,
+        elements=40,
+        left="free",
+        right="free",
+        modal_ratio=0.005,
+    )
+    truth = TrueModes(stiffer, np.full(60, 0.005))
+    fit = simulate_fit(truth, left_out[0].labels, BAND_HZ, rng=np.random.default_rng(6))
+    updated = frf_ipz.update_model(fit, left_out[1], fe_model=make_nominal())
+    assert updated.expansion is None
+    assert len(updated.model.dofs) == len(left_out[1].dofs)
+
+
+def test_a_point_whose_gain_is_off_is_named():
+    expansion = frf_ipz.ShapeExpansion(
+        points=("1:z", "2:z", "3:z", "4:z", "5:z", "6:z"),
+        ratio=np.array([1.02, 0.99, 0.85, 1.01, 1.0, 0.98]),
+        error_db=np.full(6, 0.3),
+        updated_error_db=np.full(6, 1.7),
+        stiffness_ratio=1.0,
+        masses=(),
+        split=(),
+        is_level_known=True,
+    )
+    (text,) = [text for text in expansion.statements if "gain" in text]
+    assert text.startswith("what was measured at 3:z is 15 % low in all its modes")
