@@ -44,7 +44,7 @@ def leave_out(
     updated = frf_ipz.update_model(fit, reduced_model, pairs=pairs, fe_model=fe_model)
     predicted = updated.compute_frfs(left_out.labels, left_out.s)
     nominal = frf_ipz.compute_frfs(frf_ipz.shift_to_measured_poles(pairs, reduced_model), left_out.labels, left_out.s)
-    low, high = frf_ipz.band_of_magnitudes(fit, updated, left_out.labels, left_out.s)
+    low, high = frf_ipz.band_of_magnitudes(fit, updated, labels=left_out.labels, s=left_out.s)
     magnitude = np.abs(left_out.values)
     as_predicted, after_factor = differences_db(left_out.values, predicted)
     row = {

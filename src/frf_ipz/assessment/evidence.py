@@ -86,4 +86,4 @@ class Evidence(MeasuredPoints):
     def band(self) -> tuple[FloatArray, FloatArray]:
         """90 % band of the updated model's magnitudes at the measured points, two (n_lines, n_frfs) arrays."""
         s = np.asarray(2j * np.pi * self.frfs.frequency_hz[self.lines], np.complex128)
-        return band_of_magnitudes(self.fit, self.updated_model, self.frfs.labels, s)
+        return band_of_magnitudes(self.fit, self.updated_model, labels=self.frfs.labels, s=s)

@@ -127,7 +127,7 @@ def _evaluate(model: ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) 
 
 
 def band_of_magnitudes(
-    measured: Measured, updated_model: UpdatedModel, labels: Sequence[FrfLabel], s: ComplexArray
+    measured: Measured, updated_model: UpdatedModel, *, labels: Sequence[FrfLabel], s: ComplexArray
 ) -> tuple[FloatArray, FloatArray]:
     """Give the 90 % band of any FRFs of an updated model, without the rest of a prediction.
 
@@ -169,7 +169,7 @@ def band_of_magnitudes(
     >>> fit = frf_ipz.fit_modes(frfs)
     >>> updated_model = frf_ipz.update_model(fit, frf_ipz.reduce_model(fit, beam, points=["9:+z"]))
     >>> label = frf_ipz.FrfLabel(frf_ipz.Dof(6, "z"), frf_ipz.Dof(9, "z"), frf_ipz.FrfQuantity.ACCELERANCE)
-    >>> low, high = frf_ipz.band_of_magnitudes(fit, updated_model, [label], 2j * np.pi * lines)
+    >>> low, high = frf_ipz.band_of_magnitudes(fit, updated_model, labels=[label], s=2j * np.pi * lines)
     >>> bool(np.all(low <= high))
     True
     """

@@ -123,7 +123,7 @@ def predict_left_out(beam: BeamTest, node: int) -> pd.DataFrame:
         "updated": updated.compute_frfs(labels, lines),
     }
     rows = {name: assess_agreement(left_out.values, values) for name, values in predicted.items()}
-    low, high = frf_ipz.band_of_magnitudes(fit, updated, labels, lines)
+    low, high = frf_ipz.band_of_magnitudes(fit, updated, labels=labels, s=lines)
     magnitude = np.abs(left_out.values)
     rows["updated"] |= {
         "in the band": float(np.mean((magnitude >= low) & (magnitude <= high))),

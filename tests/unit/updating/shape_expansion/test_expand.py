@@ -76,7 +76,7 @@ def expanded(left_out):
 def test_a_sensor_is_predicted_where_no_change_of_matrices_meets_the_others(left_out, expanded):
     fit, _, labels, lines, values = left_out
     assert error_db(expanded, labels, lines, values) < 0.5
-    low, high = frf_ipz.band_of_magnitudes(fit, expanded, labels, 2j * np.pi * lines)
+    low, high = frf_ipz.band_of_magnitudes(fit, expanded, labels=labels, s=2j * np.pi * lines)
     assert np.mean((np.abs(values) >= low) & (np.abs(values) <= high)) > 0.8
     assert np.median(20 * np.log10(high / low)) < 6.0
 
