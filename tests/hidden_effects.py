@@ -153,7 +153,7 @@ DRAWS = {"local modes": draw_local_modes, "cords": draw_cords, "lump": draw_lump
 class HiddenRun:
     """A machine, measured, fitted, updated and predicted at a point that nobody measured."""
 
-    def __init__(self, kind, seed):
+    def __init__(self, kind, seed, *, expand=True):
         self.hidden = hidden = DRAWS[kind](seed)
         rng = np.random.default_rng([seed, 1])
         low, high = hidden.band_hz
@@ -175,7 +175,13 @@ class HiddenRun:
         self.frfs, self.fit = frfs, frf_ipz.fit_modes(frfs)
         self.reduced = frf_ipz.reduce_model(self.fit, hidden.model, points=[hidden.point])
         self.pairs = frf_ipz.pair_roots(self.fit, self.reduced)
-        self.updated = frf_ipz.update_model(self.fit, self.reduced, pairs=self.pairs, fe_model=hidden.model)
+        self.updated = frf_ipz.update_model(
+            self.fit,
+            self.reduced,
+            pairs=self.pairs,
+            fe_model=hidden.model,
+            options=frf_ipz.UpdateOptions(expand=expand),
+        )
         self.prediction = frf_ipz.predict_frfs(self.fit, self.updated, points=[hidden.point])
         s = 2j * np.pi * self.prediction.frequency_hz
         self.truth = np.abs(frf_ipz.compute_frfs(hidden.machine, self.prediction.labels, s))

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from frf_ipz.updating.updated_model import UpdatedModel
 
 TAKES_CARE_DB = 1.0  # a sixth of a gain margin of 6 dB, as in the assessment
+NO_USE_DB = 3.0  # half of that margin: a scale that is so far off where it is known is a mistake, which must show
 MOST_ENDS = 100  # sensors and excited DOFs
 
 
@@ -83,6 +84,8 @@ def with_expanded_shapes(
     if left_out is None or errors[best] >= np.median(own):
         return updated
     modes = expand_modes(loaded.model, measured, error=loaded.error, is_scale_known=fit.unknown_scale == "none")
+    if fit.unknown_scale == "none" and abs(20 * np.log10(modes.gain)) > NO_USE_DB:
+        return updated
     model, ensemble = build_expanded_model(
         loaded.model, modes, count=options.ensemble, calibration=left_out.calibration, seed=options.seed
     )
