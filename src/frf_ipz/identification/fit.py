@@ -41,7 +41,12 @@ from frf_ipz.identification.search.find_modes import (
     variance_factors,
 )
 from frf_ipz.identification.search.goodness_of_fit import assess_fit
-from frf_ipz.identification.search.split_half import SplitHalf, fit_halves, unconfirmed_reasons
+from frf_ipz.identification.search.split_half import (
+    SplitHalf,
+    fit_halves,
+    unconfirmed_reasons,
+    without_unconfirmed,
+)
 from frf_ipz.identification.stabilization import columns_of_modes
 from frf_ipz.identification.stated_modes import take_stated_modes
 from frf_ipz.modes import ModalParameters
@@ -98,9 +103,11 @@ def fit_modes(
         return take_stated_modes(frfs, chosen)
     fitted = find_modes(frfs, chosen, progress=progress)
     halves = None
-    if fitted.noise_from == "misfit":
+    if fitted.noise_from == "misfit" or of_one_impact(frfs).any():
         progress(0.7, "fitting each half of the lines")
         halves = fit_halves(frfs, fitted, chosen)
+        if halves is not None:
+            fitted, halves = without_unconfirmed(fitted, halves, chosen)
     progress(0.9, "finding zeros and errors")
     return with_repeated_roots(_as_modal_fit(frfs, fitted, chosen, halves))
 

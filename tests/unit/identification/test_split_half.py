@@ -7,9 +7,12 @@ import pytest
 from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.identification.fit import fit_modes
+from frf_ipz.identification.likelihood.refinement import refine_poles
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.identification.root_covariance import pair_blocks
 from frf_ipz.identification.search.find_modes import find_modes
+from frf_ipz.identification.search.goodness_of_fit import assess_fit
+from frf_ipz.identification.search.split_half import SplitHalf, without_unconfirmed
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
@@ -95,6 +98,22 @@ def test_a_mode_of_one_half_is_unconfirmed():
     assert row["reason"].startswith("comes up in one half only of the lines")
     assert "1 of 5 modes do not come up in both halves" in fit.warnings[0]
     assert count_within(fit, truth) == 4
+
+
+def test_a_split_that_no_half_has_is_dropped_and_can_be_called_back():
+    frfs = four_modes()
+    fitted = find_modes(frfs, FitOptions())
+    first = fitted.fit.poles[np.argmin(np.abs(fitted.fit.poles.imag))]
+    poles = np.append(fitted.fit.poles, first + 0.5j * -first.real)
+    fit = refine_poles(fitted.lines.weighted(), poles, fitted.terms, iterations=0)
+    assessed = assess_fit(fitted.lines.weighted(shared=True), fit, fitted.terms)
+    with_split = replace(fitted, fit=fit, goodness=assessed)
+    halves = SplitHalf(n_halves=np.array([2, 2, 2, 2, 0]), scatter=1.0, variance_factor=np.ones(10), shift=np.zeros(10))
+    kept, of_kept = without_unconfirmed(with_split, halves, FitOptions())
+    assert len(kept.fit.poles) == len(of_kept.n_halves) == len(kept.goodness.significance) == 4
+    assert "pin_hz = [" in str(kept.decisions[-1]["reason"])
+    called_back = FitOptions(pin_hz=(float(np.abs(poles[-1])) / (2 * np.pi),))
+    assert len(without_unconfirmed(with_split, halves, called_back)[0].fit.poles) == 5
 
 
 def count_within(fit, truth):

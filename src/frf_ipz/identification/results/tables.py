@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from frf_ipz.identification.search.split_half import SplitHalf
 
 BANDS = 8  # of the misfit table, of equal width
-GOOD_DAMPING, POOR_DAMPING = 0.05, 0.15  # relative standard deviation of the damping
+GOOD, FAIR = 0.9, 2 / 3  # probability to be found again above which a mode is good, or fair: two of three fits have it
+GOOD_DAMPING = 0.05  # relative standard deviation of the damping
 GOOD_SIGNIFICANCE = 5.0  # times what the BIC demands
 COLLINEAR = 0.9  # phase collinearity of a mode that looks normal
 SAME_SHAPE = 0.9  # MAC between two modes at which the shapes do not distinguish them
@@ -52,7 +53,7 @@ def mode_table(
     Returns
     -------
     DataFrame
-        One row a mode; `quality` is good, fair or poor, and `remarks` says why.
+        One row a mode; `quality` says in a word, good, fair or poor, how likely it is to be found again.
     """
     shapes, doubts = residues.T, unconfirmed_reasons(halves, modes)
     assurance = modal_assurance(shapes, shapes)
@@ -72,10 +73,7 @@ def mode_table(
         "found_again": found_again(goodness, modes, halves),
     }
     remarks = [_remarks(rows, number, float(confused[number])) for number in range(len(poles))]
-    quality = [
-        "poor" if doubt else _quality(rows, number, len(text))
-        for number, (text, doubt) in enumerate(zip(remarks, doubts, strict=True))
-    ]
+    quality = ["good" if value > GOOD else "fair" if value > FAIR else "poor" for value in rows["found_again"]]
     remarks = [[*text, doubt] if doubt else text for text, doubt in zip(remarks, doubts, strict=True)]
     return pd.DataFrame({**rows, "quality": quality, "remarks": ["; ".join(text) for text in remarks]})
 
@@ -138,8 +136,3 @@ def _remarks(rows: dict[str, FloatArray], number: int, confused: float) -> list[
     if confused > SAME_SHAPE:
         remarks.append("same shape as the neighbouring mode")
     return remarks
-
-
-def _quality(rows: dict[str, FloatArray], number: int, n_remarks: int) -> str:
-    poor = rows["damping_std_ratio"][number] > POOR_DAMPING
-    return "poor" if poor or n_remarks > 2 else "fair" if n_remarks else "good"

@@ -24,6 +24,8 @@ from frf_ipz.errors import NoModesError
 from frf_ipz.identification.likelihood.refinement import refine_poles
 from frf_ipz.identification.measured_lines import FEWEST_LINES
 from frf_ipz.identification.search.find_modes import FittedModes, find_modes, variance_factors
+from frf_ipz.identification.search.spurious_poles import DEMANDED
+from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfSet
@@ -86,6 +88,60 @@ def unconfirmed_reasons(halves: SplitHalf | None, modes: IntArray) -> tuple[str,
     reasons = {0: "comes up in neither half", 1: "comes up in one half only"}
     why = " of the lines (even, odd), when each is fitted by itself"
     return tuple(reasons[count] + why if count < HALVES else "" for count in halves.n_halves[modes].tolist())
+
+
+def without_unconfirmed(fitted: FittedModes, halves: SplitHalf, options: FitOptions) -> tuple[FittedModes, SplitHalf]:
+    """Drop the modes that neither half has, and that are weak or share the peak of a mode that both have.
+
+    Parameters
+    ----------
+    fitted : FittedModes
+        The fit of all lines.
+    halves : SplitHalf
+        How it compares with those of the halves.
+    options : FitOptions
+        Pinned poles, which stay.
+
+    Returns
+    -------
+    (FittedModes, SplitHalf)
+        Without these modes; the decisions list them.
+    """
+    poles, significance = fitted.fit.poles, fitted.goodness.significance
+    hertz = natural_frequency_hz(poles)
+    inside = (hertz >= fitted.lines.band_hz[0]) & (hertz <= fitted.lines.band_hz[1])
+    apart = np.abs(poles[:, None] - poles) / -(poles.real[:, None] + poles.real)
+    shares_peak = ((apart < 1) & (halves.n_halves == HALVES) & (significance > significance[:, None])).any(axis=1)
+    dropped = inside & (halves.n_halves == 0) & (shares_peak | (significance < DEMANDED))
+    for pin in options.pinned:
+        dropped[np.argmin(np.abs(hertz - pin.hz))] = False
+    if not dropped.any():
+        return fitted, halves
+    data = replace(fitted.lines.weighted(), real_modes=fitted.fit.system.real_modes)
+    fit = refine_poles(data, poles[~dropped], fitted.terms)
+    kept = optimize.linear_sum_assignment(np.abs(fit.poles[:, None] - poles) / np.abs(poles))[1]
+    decisions = [
+        {
+            "frequency_hz": float(hertz[number]),
+            "damping_ratio": float(damping_ratio(poles[[number]])[0]),
+            "action": "dropped",
+            "reason": "comes up in neither half of the lines (even, odd), when each is fitted by itself, and "
+            + ("shares the peak of a mode that does" if shares_peak[number] else "hardly stands out")
+            + f"; [fit] pin_hz = [{hertz[number]:.6g}] calls it back",
+        }
+        for number in np.flatnonzero(dropped).tolist()
+    ]
+    goodness = fitted.goodness.of_poles(poles, fit.poles)
+    parts = np.concatenate([kept, kept + len(poles)])
+    return (
+        replace(fitted, fit=fit, goodness=goodness, decisions=(*fitted.decisions, *decisions)),
+        replace(
+            halves,
+            n_halves=halves.n_halves[kept],
+            variance_factor=halves.variance_factor[parts],
+            shift=halves.shift[parts],
+        ),
+    )
 
 
 def fit_halves(frfs: FrfSet, fitted: FittedModes, options: FitOptions) -> SplitHalf | None:
