@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from frf_ipz.pairing.model_roots import ModelZeros
 
 ZERO_STD = 0.04  # of the logarithm of a zero's frequency, after the mapping by poles
-ZERO_GATE = 0.25  # logarithm beyond which two zeros are not the same
+ZERO_GATE = 0.25  # logarithm, of the modulus or of the angle, beyond which two zeros are not the same
 WRONG_SLOPE = 6.0  # cost of a slope of the other sign
 UNMATCHED = 9.0  # a zero stays unmatched rather than three standard deviations off
 UNMEASURED = 3.0  # a zero of the model in the band need not show: damping may hide it
@@ -81,7 +81,8 @@ def pair_zeros(
     kinds = np.array([fit.zeros.kind[zero] for zero in measured], dtype=object)
     is_pairable = np.isin(kinds.astype(str), PAIRABLE) & fit.zeros.identifiable[measured]
     is_same_kind = kinds[:, None] == np.array(model.kind, dtype=object)
-    is_allowed = is_pairable[:, None] & is_same_kind & (np.abs(gap) < ZERO_GATE)
+    turn = np.angle(values)[:, None] - np.angle(model.values)
+    is_allowed = is_pairable[:, None] & is_same_kind & (np.abs(gap) < ZERO_GATE) & (np.abs(turn) < ZERO_GATE)
     unmeasured = np.where(in_band(model.values, fit.band_hz, poles), UNMEASURED, 0.0)
     unmatched = np.full(len(values), UNMATCHED), unmeasured
     tried = []

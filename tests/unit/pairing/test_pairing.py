@@ -230,9 +230,8 @@ def test_the_slope_at_zeros_is_that_of_the_frf():
     assert np.array_equal(np.sign(nearby[0] - nearby[1]), zeros.slope_sign)
 
 
-def test_the_slope_separates_two_zeros():
-    """The nearer zero has the opposite slope of the measured one, so the farther one is its partner."""
-    model = chain(damping=0.001)
+def one_zero(model):
+    """A fit of which one zero is left, and the sign of the slope there."""
     fit = measured(model)
     index = int(np.flatnonzero(fit.zeros.frf == 0)[0])
     alone = replace(
@@ -243,15 +242,30 @@ def test_the_slope_separates_two_zeros():
         identifiable=np.array([True]),
         reason=("",),
     )
-    value = alone.values[0]
     sign = measured_slope_sign(fit.model, 0, 0, alone.values)[0]
-    fit_of_one = replace(fit, zeros=alone, covariance=1e-6 * np.eye(2 * fit.n_modes + 2))
+    return replace(fit, zeros=alone, covariance=1e-6 * np.eye(2 * fit.n_modes + 2)), alone.values[0], sign
+
+
+def test_the_slope_separates_two_zeros():
+    """The nearer zero has the opposite slope of the measured one, so the farther one is its partner."""
+    fit_of_one, value, sign = one_zero(chain(damping=0.001))
     choice = ModelZeros(
         values=np.array([0.985 * value, 1.01 * value]), kind=("complex",) * 2, slope_sign=np.array([sign, -sign])
     )
     nothing = np.zeros(0), np.zeros(0)
     assert pair_zeros(fit_of_one, 0, choice, nothing, 1.0).matching.partner.tolist() == [0]
     assert pair_zeros(fit_of_one, 0, choice, nothing, -1.0).matching.partner.tolist() == [1]
+
+
+def test_a_zero_near_the_axis_is_none_that_has_left_it():
+    """Of the same modulus, but with 80 % of critical damping: shapes make it, and no change of stiffness joins them."""
+    fit_of_one, value, sign = one_zero(chain(damping=0.001))
+    nothing = np.zeros(0), np.zeros(0)
+    for angle, partner in ((0.01, 0), (np.arcsin(0.8), -1)):
+        choice = ModelZeros(
+            values=np.array([value * np.exp(1j * angle)]), kind=("complex",), slope_sign=np.array([sign])
+        )
+        assert pair_zeros(fit_of_one, 0, choice, nothing, 1.0).matching.partner.tolist() == [partner]
 
 
 def test_a_zero_on_a_pole_is_no_obstacle():
