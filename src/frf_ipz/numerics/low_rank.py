@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+from scipy import sparse
 
-from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray, Matrix
 
 Vectors: TypeAlias = ComplexArray | FloatArray
 ROUNDING = 1e-10  # of the largest entry or eigenvalue of a matrix
 COLUMNS_AT_ONCE = 1024
+SPARSE = 0.1  # of the entries of all vectors, up to which sparse products are faster
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -21,7 +23,7 @@ class LowRankMatrices:
     Parameters
     ----------
     vectors : (r, m) array
-        All q, those of one matrix next to one another.
+        All q, those of one matrix next to one another; sparse where most entries are zero.
     weights : (m,) array
         All e.
     owners : (k,) int array
@@ -32,7 +34,7 @@ class LowRankMatrices:
         Number of matrices.
     """
 
-    vectors: FloatArray
+    vectors: FloatArray | Matrix
     weights: FloatArray
     owners: IntArray
     starts: IntArray
@@ -51,17 +53,40 @@ class LowRankMatrices:
         (n, p) array
             Of every pair and matrix; real where all vectors are.
         """
-        is_real = not (np.any(left.imag) or np.any(right.imag))
-        y, x = (left.real, right.real) if is_real else (left, right)
-        shape = (y.shape[1], self.count)
-        result: Vectors = np.zeros(shape) if is_real else np.zeros(shape, np.complex128)
+        own = self.own_forms(left, right)
+        shape = (left.shape[1], self.count)
+        result: Vectors = np.zeros(shape, np.complex128) if np.iscomplexobj(own) else np.zeros(shape)
+        result[:, self.owners] = own
+        return result
+
+    def own_forms(self, left: Vectors, right: Vectors) -> Vectors:
+        """Give ``y^T A_p x`` of those matrices that are not zero.
+
+        Parameters
+        ----------
+        left, right : (r, n) complex array
+            y and x.
+
+        Returns
+        -------
+        (n, k) array
+            In the order of `owners`; real where all vectors are.
+        """
+        y, x = (left, right) if _are_complex(left, right) else (left.real, right.real)
+        shape = (y.shape[1], len(self.owners))
+        result: Vectors = np.zeros(shape, np.complex128) if np.iscomplexobj(y) else np.zeros(shape)
         if not len(self.owners):
             return result
+        turned = self.vectors.T
         for first in range(0, y.shape[1], COLUMNS_AT_ONCE):
             part = slice(first, first + COLUMNS_AT_ONCE)
-            products = (y[:, part].T @ self.vectors) * (x[:, part].T @ self.vectors) * self.weights
-            result[part, self.owners] = np.add.reduceat(products, self.starts, axis=1)
+            products = np.asarray(turned @ y[:, part]) * np.asarray(turned @ x[:, part]) * self.weights[:, None]
+            result[part] = np.add.reduceat(products, self.starts, axis=0).T
         return result
+
+
+def _are_complex(left: Vectors, right: Vectors) -> bool:
+    return bool(np.any(left.imag) or np.any(right.imag))
 
 
 def factorise(matrices: FloatArray) -> LowRankMatrices:
@@ -99,8 +124,9 @@ def factorise(matrices: FloatArray) -> LowRankMatrices:
         owners.append(number)
         starts.append(used)
         used += whole.shape[1]
+    joined = np.hstack(vectors) if vectors else np.zeros((order, 0))
     return LowRankMatrices(
-        vectors=np.hstack(vectors) if vectors else np.zeros((order, 0)),
+        vectors=sparse.csr_array(joined) if np.count_nonzero(joined) < SPARSE * joined.size else joined,
         weights=np.concatenate(weights) if weights else np.zeros(0),
         owners=np.array(owners, np.int64),
         starts=np.array(starts, np.int64),

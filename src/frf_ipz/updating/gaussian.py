@@ -12,17 +12,25 @@ express them), and the slack, a variance on top of their covariance, grows until
 Whatever is computed of n data costs ``n k^2`` for k parameters. The covariance of the data, their slack left out, is
 diagonalised once (`Linearised`), block by block and in units of the slack; the errors that all data share become
 parameters of unit variance. From there on every slack is a number on a diagonal.
+
+The information for any slack is a sum over the data with other weights. As functions of the level of noise all these
+weights are much alike, so that those of a few slacks, mixed, are those of any other to `ALIKE`: the sum over the data
+is formed for these only, and the search for the slack costs what the parameters do.
+
+Zeros of many FRFs say little more than the shapes of a few modes do, so most combinations of parameters are moved by no
+datum. Those of which the data say less than `UNTOLD` of what the prior says are left out, by a Cholesky factor with
+pivots of the information (LAPACK's ``pstrf``), and keep their prior.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_solve, cholesky, lapack
 
-from frf_ipz.arrays import BoolArray, FloatArray
+from frf_ipz.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -38,6 +46,9 @@ LARGEST_SCALE_STEP = 2.0  # of the logarithm of a scale in one step
 FLAT = 1e-4  # of the logarithm of the evidence: what a further step would gain is nothing (1e-2 moves printed digits)
 MAX_HALVINGS = 10
 ROWS_AT_ONCE = 4096
+ALIKE = 1e-4  # relative, of the noise of each datum: none is known as well
+LARGEST_SHARES = 1e3  # in a mixture: what rounding may grow by
+UNTOLD = 1e-6  # of the prior's information: a deviation that so few data narrow is the prior's to seven digits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,8 +82,8 @@ class Linearised:
     data : (n,) array
         d, in units of the slack.
     parts : tuple of (n, m_i) arrays
-        Sensitivity to each prior term's unit normal numbers, for a standard deviation of 1; where they are more than
-        the data, to as many combinations of them as there are data.
+        Sensitivity to each prior term's unit normal numbers, for a standard deviation of 1; or to those combinations
+        of them that the data tell of.
     bases : tuple of (k_i, m_i) arrays, or None
         These combinations, orthonormal; None where they are the numbers themselves.
     common : (n, c) array
@@ -83,8 +94,12 @@ class Linearised:
         Sum of the logarithms of the units.
     axes : tuple of (m, m) arrays
         Directions of each block, by columns, in units of the slack.
+    places : tuple of (m,) int arrays
+        The data of each block.
     slack : (n,) array
         The units.
+    sums : list of pair of (n,) and (c + k + 1, c + k + 1) array
+        Weights of the data, and the sums of products of sensitivity and data with them, as far as they are known.
     """
 
     data: FloatArray
@@ -93,7 +108,9 @@ class Linearised:
     common: FloatArray
     level: FloatArray
     axes: tuple[FloatArray, ...]
+    places: tuple[IntArray, ...]
     slack: FloatArray
+    sums: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
 
     def rotated(self, rows: FloatArray) -> FloatArray:
         """Express numbers of the data in these coordinates.
@@ -108,7 +125,7 @@ class Linearised:
         (n, ...) array
             The same.
         """
-        return _rotated(self.axes, self.slack, rows)
+        return _rotated(self.axes, self.places, self.slack, rows)
 
     def square(self, error: FloatArray, factor: float) -> float:
         """Weigh an error by the inverse of the noise.
@@ -155,7 +172,20 @@ class Linearised:
             scaled = [scale * part[rows] for scale, part in zip(scales, self.parts, strict=True)]
             yield rows, np.hstack([self.common[rows], *scaled])
 
-    def sensitivity(self, scales: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
+    def blocks(self) -> Iterator[tuple[slice, IntArray, FloatArray]]:
+        """Give the blocks of the noise.
+
+        Yields
+        ------
+        slice, (m,) int array, (m, m) array
+            Rows in these coordinates, the data they are made of, and the axes.
+        """
+        first = 0
+        for place, vectors in zip(self.places, self.axes, strict=True):
+            yield slice(first, first + len(place)), place, vectors
+            first += len(place)
+
+    def sensitivity(self, scales: FloatArray) -> Iterator[tuple[IntArray, FloatArray]]:
         """Give the sensitivity of the data, as they were given, to scaled combinations, block by block.
 
         Parameters
@@ -165,15 +195,12 @@ class Linearised:
 
         Yields
         ------
-        slice, (m, k) array
-            Rows, and their sensitivity.
+        (m,) int array, (m, k) array
+            Which data, and their sensitivity.
         """
-        first = 0
-        for vectors in self.axes:
-            rows = slice(first, first + len(vectors))
+        for rows, place, vectors in self.blocks():
             scaled = [scale * part[rows] for scale, part in zip(scales, self.parts, strict=True)]
-            yield rows, self.slack[rows, None] * (vectors @ np.hstack(scaled))
-            first += len(vectors)
+            yield place, self.slack[place, None] * (vectors @ np.hstack(scaled))
 
     def whole(self, combined: FloatArray) -> FloatArray:
         """Turn values of the combinations into those of all whitened parameters.
@@ -213,6 +240,42 @@ class Linearised:
             [p if basis is None else p @ basis for p, basis in zip(pieces, self.bases, strict=True)], axis=-1
         )
 
+    def products(self, weights: FloatArray, scales: FloatArray) -> FloatArray:
+        """Add up products of sensitivity and data over all data.
+
+        Parameters
+        ----------
+        weights : (n,) array
+            Of the data, positive.
+        scales : (t,) array
+            Standard deviations of the terms.
+
+        Returns
+        -------
+        (c + k + 1, c + k + 1) array
+            Of the sensitivity to shared errors and scaled parameters; last of the data.
+        """
+        sizes = [part.shape[1] for part in self.parts]
+        factors = np.concatenate([np.ones(self.common.shape[1]), np.repeat(scales, sizes), np.ones(1)])
+        return np.asarray(self._sum(weights) * factors[:, None] * factors)
+
+    def _sum(self, weights: FloatArray) -> FloatArray:
+        if self.sums:
+            known = np.stack([others / weights for others, _ in self.sums], axis=1)
+            shares = np.linalg.lstsq(known, np.ones(len(weights)), rcond=None)[0]
+            is_alike = bool(np.all(np.abs(known @ shares - 1) < ALIKE))
+            if is_alike and np.abs(shares) @ known.max(axis=0) < LARGEST_SHARES:
+                return np.asarray(np.tensordot(shares, np.stack([each for _, each in self.sums]), 1))
+        size = self.common.shape[1] + sum(part.shape[1] for part in self.parts) + 1
+        total = np.zeros((size, size))
+        for first in range(0, len(weights), ROWS_AT_ONCE):
+            rows = slice(first, first + ROWS_AT_ONCE)
+            joined = np.hstack([self.common[rows], *(part[rows] for part in self.parts), self.data[rows, None]])
+            joined *= np.sqrt(weights[rows])[:, None]
+            total += joined.T @ joined
+        self.sums.append((weights, total))
+        return total
+
     def information(self, scales: FloatArray, factor: float) -> tuple[FloatArray, FloatArray]:
         """Give the information of shared errors and parameters, with that of their prior.
 
@@ -230,20 +293,21 @@ class Linearised:
         right : (c + k,) array
             Weighted data.
         """
-        size = self.common.shape[1] + sum(part.shape[1] for part in self.parts)
-        information, right = np.eye(size), np.zeros(size)
-        weights = 1 / (self.level + factor**2)
-        for rows, columns in self.columns(scales):
-            weighted = columns * np.sqrt(weights[rows])[:, None]
-            information += weighted.T @ weighted
-            right += weighted.T @ (np.sqrt(weights[rows]) * self.data[rows])
-        return cholesky(information, check_finite=False), right
+        products = self.products(1 / (self.level + factor**2), scales)
+        information = products[:-1, :-1].copy()
+        information[np.diag_indices_from(information)] += 1.0
+        return cholesky(information, check_finite=False), products[:-1, -1]
 
 
 def linearise(
-    parts: Sequence[FloatArray], data: FloatArray, noise: TargetNoise, slack: FloatArray | None = None
+    parts: Sequence[FloatArray],
+    data: FloatArray,
+    noise: TargetNoise,
+    slack: FloatArray | None = None,
+    *,
+    scales: FloatArray | None = None,
 ) -> Linearised:
-    """Diagonalise the noise of linear data.
+    """Diagonalise the noise of linear data, and find the combinations of parameters that they tell of.
 
     Parameters
     ----------
@@ -255,6 +319,8 @@ def linearise(
         R without slack, positive definite.
     slack : (n,) array, optional
         Standard deviations of what no parameter explains, for a factor of 1.
+    scales : (t,) array, optional
+        Standard deviations of the terms, about which it is judged what data tell; 1 by default.
 
     Returns
     -------
@@ -262,40 +328,53 @@ def linearise(
         The same data.
     """
     units = np.ones(len(data)) if slack is None else slack
-    levels, axes = [], []
+    levels, axes, places = [], [], []
     for part, block in noise.parts():
         values, vectors = np.linalg.eigh(block / np.outer(units[part], units[part]))
         levels.append(np.maximum(values, np.finfo(float).tiny))
         axes.append(vectors)
-    turned = tuple(axes)
-    combined = [_combined(_rotated(turned, units, part)) for part in parts]
+        places.append(part)
+    turned = tuple(axes), tuple(places), units
+    level = np.concatenate(levels) if levels else np.zeros(0)
+    stds = np.ones(len(parts)) if scales is None else scales
+    told = [_told(_rotated(*turned, part), level / std**2) for part, std in zip(parts, stds, strict=False)]
     return Linearised(
-        data=_rotated(turned, units, data),
-        parts=tuple(part for part, _ in combined),
-        bases=tuple(basis for _, basis in combined),
-        common=_rotated(turned, units, noise.common),
-        level=np.concatenate(levels) if levels else np.zeros(0),
-        axes=turned,
+        data=_rotated(*turned, data),
+        parts=tuple(part for part, _ in told),
+        bases=tuple(basis for _, basis in told),
+        common=_rotated(*turned, noise.common),
+        level=level,
+        axes=turned[0],
+        places=turned[1],
         slack=units,
     )
 
 
-def _combined(part: FloatArray) -> tuple[FloatArray, FloatArray | None]:
-    """At most as many numbers as data: the prior is the same along all orthonormal combinations."""
-    if part.shape[1] <= part.shape[0]:
+def _told(part: FloatArray, level: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+    """Find combinations that data tell of; the prior is the same along all of them, and with slack data tell less."""
+    information = np.zeros((part.shape[1],) * 2)
+    for first in range(0, len(part), ROWS_AT_ONCE):
+        rows = slice(first, first + ROWS_AT_ONCE)
+        weighted = part[rows] / np.sqrt(level[rows, None])
+        information += weighted.T @ weighted
+    factor, pivots, rank, _ = lapack.dpstrf(information, tol=UNTOLD, lower=1, overwrite_a=1)
+    if rank == len(information):
         return part, None
-    basis, triangle = np.linalg.qr(part.T)
-    return triangle.T, basis
+    directions = np.zeros((len(information), rank))
+    directions[pivots - 1] = np.tril(factor)[:, :rank]
+    basis = np.linalg.qr(directions)[0]
+    return part @ basis, basis
 
 
-def _rotated(axes: tuple[FloatArray, ...], slack: FloatArray, rows: FloatArray) -> FloatArray:
+def _rotated(
+    axes: tuple[FloatArray, ...], places: tuple[IntArray, ...], slack: FloatArray, rows: FloatArray
+) -> FloatArray:
     result = np.empty(rows.shape)
     first = 0
-    for vectors in axes:
-        part = slice(first, first + len(vectors))
-        units = slack[part] if rows.ndim == 1 else slack[part, None]
-        result[part] = vectors.T @ (rows[part] / units)
-        first += len(vectors)
+    for place, vectors in zip(places, axes, strict=True):
+        units = slack[place] if rows.ndim == 1 else slack[place, None]
+        result[first : first + len(place)] = vectors.T @ (rows[place] / units)
+        first += len(place)
     return result
 
 
@@ -329,6 +408,41 @@ def solve_step(linear: Linearised, scales: FloatArray, factor: float = 0.0) -> G
         n_determined=float(len(mean) - np.sum(inverse_root**2)),
         root=root,
     )
+
+
+def distance_to_optimum(
+    linear: Linearised, step: GaussianStep, scales: FloatArray, factor: float, whitened: FloatArray, error: FloatArray
+) -> float:
+    """Measure how far parameters are from where their own error would take them.
+
+    Parameters
+    ----------
+    linear : Linearised
+        Sensitivity and noise near these parameters.
+    step : GaussianStep
+        The posterior, with the same scales and factor.
+    scales : (t,) array
+        Standard deviations of the terms.
+    factor : float
+        On the slack.
+    whitened : (k,) array
+        Whitened parameters.
+    error : (n,) array
+        Targets minus model for them.
+
+    Returns
+    -------
+    float
+        Posterior standard deviations, over all directions together, whatever the number of data.
+    """
+    now, n_common = linear.combined(whitened), linear.common.shape[1]
+    turned, weights = linear.rotated(error), 1 / (linear.level + factor**2)
+    right = np.zeros(len(step.root))
+    for rows, columns in linear.columns(scales):
+        right += columns.T @ (weights[rows] * (turned[rows] + columns[:, n_common:] @ now))
+    change = cho_solve((step.root, False), right, check_finite=False)[n_common:] - now
+    beyond = max(float(whitened @ whitened - now @ now), 0.0)  # along combinations that no datum moves
+    return float(np.sqrt(np.sum((step.root[n_common:, n_common:] @ change) ** 2) + beyond))
 
 
 def step_by_discrepancy(linear: Linearised, scales: FloatArray, factor: float) -> tuple[GaussianStep, float]:
@@ -384,16 +498,14 @@ def most_contradicted(linear: Linearised, scales: FloatArray, limit: float, *, l
     weighted_error, explained = np.empty(len(weights)), np.empty(len(weights))
     data, own = np.empty(len(weights)), np.empty(len(weights))
     inverse_root = lapack.dtrtri(root)[0]
-    places = np.cumsum([0, *(len(vectors) for vectors in linear.axes)])
-    for number, vectors in enumerate(linear.axes):
-        rows = slice(places[number], places[number + 1])
+    for rows, place, vectors in linear.blocks():
         columns = np.hstack(
             [linear.common[rows], *(s * part[rows] for s, part in zip(scales, linear.parts, strict=True))]
         )
-        weighted_error[rows] = vectors @ (weights[rows] * (linear.data[rows] - columns @ mean))
-        explained[rows] = np.sum((vectors @ (weights[rows, None] * (columns @ inverse_root))) ** 2, axis=1)
-        own[rows] = vectors**2 @ weights[rows]
-        data[rows] = vectors @ linear.data[rows]
+        weighted_error[place] = vectors @ (weights[rows] * (linear.data[rows] - columns @ mean))
+        explained[place] = np.sum((vectors @ (weights[rows, None] * (columns @ inverse_root))) ** 2, axis=1)
+        own[place] = vectors**2 @ weights[rows]
+        data[place] = vectors @ linear.data[rows]
     remaining = np.maximum(own - explained, np.finfo(float).tiny)
     distance = np.where(np.abs(data) >= least, np.abs(weighted_error) / np.sqrt(remaining), 0.0)
     worst = int(np.argmax(distance))
@@ -535,8 +647,7 @@ class _ScaleSearch:
         factor = float(scales[-1]) if has_slack else 0.0
         root, right = linear.information(scales[:count], factor)
         mean = cho_solve((root, False), right, check_finite=False)
-        inverse_root = lapack.dtrtri(root)[0]
-        covariance = inverse_root @ inverse_root.T
+        covariance = _inverse(root)
         weights = 1 / (linear.level + factor**2)
         value = 0.5 * float(weights @ linear.data**2 - right @ mean) + float(np.log(np.diagonal(root)).sum())
         value -= 0.5 * float(np.log(weights).sum())
@@ -562,14 +673,22 @@ class _ScaleSearch:
         """Slope by the logarithm of the slack, and its row of the expected curvature."""
         linear, square = self.linear, factor**2
         weights = 1 / (linear.level + square)
-        slope, row = 0.0, np.zeros(len(places) + 1)
-        for rows, columns in linear.columns(scales):
-            weight = weights[rows]
-            solved = columns @ covariance
-            own = weight - weight**2 * np.einsum("ij,ij->i", solved, columns)
-            error = weight * (linear.data[rows] - columns @ mean)
-            slope += square * float(own.sum() - error @ error)
-            for number, place in enumerate(places):
-                row[number] += 2 * square * float(np.sum((weight[:, None] * solved[:, place]) ** 2))
-            row[-1] += 2 * square**2 * float(np.sum(own**2))
+        products = linear.products(weights**2, scales)
+        told = products[:-1, :-1]  # by how much the information falls
+        error = np.concatenate([-mean, np.ones(1)])
+        misfit = float(error @ products @ error)
+        fallen = covariance @ told
+        share = float(np.trace(fallen)) / float(weights.sum())
+        slope = square * (float(weights.sum()) * (1 - share) - misfit)
+        row = np.zeros(len(places) + 1)
+        for number, place in enumerate(places):
+            row[number] = 2 * square * float(np.sum(fallen[place] * covariance[:, place].T))
+        # the trace of the square of R^-1 without what parameters explain, as if they explained the same of every datum
+        row[-1] = 2 * (square * (1 - share)) ** 2 * float(np.sum(weights**2))
         return slope, row
+
+
+def _inverse(root: FloatArray) -> FloatArray:
+    """Inverse of a matrix from its upper Cholesky factor."""
+    upper = np.triu(lapack.dpotri(root)[0])
+    return np.asarray(upper + np.triu(upper, 1).T)

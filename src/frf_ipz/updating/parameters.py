@@ -201,9 +201,12 @@ def generic_basis(model: ReducedModel, *, std: float = GENERIC_STD_ALONE, common
     omega = np.sqrt(np.maximum(poles.values.real, 0.0))[:n_free]
     shares = omega * (model.mass @ poles.right_vectors.real)[:, :n_free]
     first, second = np.triu_indices(len(omega))
-    products = np.einsum("ak,bk->kab", shares[:, first], shares[:, second])
-    diagonal = first == second
-    stiffness = np.where(diagonal[:, None, None], products, products + products.transpose(0, 2, 1))
+    stiffness = np.empty((len(first), len(shares), len(shares)))
+    for matrix, i, j in zip(stiffness, first.tolist(), second.tolist(), strict=True):
+        np.outer(shares[:, i], shares[:, j], out=matrix)
+        if i != j:
+            matrix += matrix.T.copy()
+    diagonal, unchanged = first == second, np.zeros(stiffness.shape)  # which takes no memory: nothing is written there
     roots = [
         PriorTerm(name="any change of the stiffness", root=np.diag(np.where(diagonal, np.sqrt(2.0), 1.0)), std=std)
     ]
@@ -213,8 +216,8 @@ def generic_basis(model: ReducedModel, *, std: float = GENERIC_STD_ALONE, common
         )
     return ParameterBasis(
         names=tuple(f"stiffness {i + 1}-{j + 1}" for i, j in zip(first, second, strict=True)),
-        mass=np.zeros_like(stiffness),
-        damping=np.zeros_like(stiffness),
+        mass=unchanged,
+        damping=unchanged,
         stiffness=stiffness,
         logarithmic=np.zeros(len(first), bool),
         terms=tuple(roots),
@@ -294,14 +297,23 @@ def join_bases(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:
     terms += [replace(term, root=np.pad(term.root, ((n_first, 0), (0, 0)))) for term in second.terms]
     return ParameterBasis(
         names=first.names + second.names,
-        mass=np.concatenate([first.mass, second.mass]),
-        damping=np.concatenate([first.damping, second.damping]),
-        stiffness=np.concatenate([first.stiffness, second.stiffness]),
+        mass=_stacked(first.mass, second.mass),
+        damping=_stacked(first.damping, second.damping),
+        stiffness=_stacked(first.stiffness, second.stiffness),
         logarithmic=np.concatenate([first.logarithmic, second.logarithmic]),
         terms=tuple(terms),
         regions=first.regions,
         is_from_diagnosis=first.is_from_diagnosis or second.is_from_diagnosis,
     )
+
+
+def _stacked(first: FloatArray, second: FloatArray) -> FloatArray:
+    """One after the other; matrices that are zero take no memory, as nothing is written into them."""
+    result = np.zeros((len(first) + len(second), *first.shape[1:]))
+    for part, matrices in ((slice(len(first)), first), (slice(len(first), None), second)):
+        if np.any(matrices):
+            result[part] = matrices
+    return result
 
 
 def unwhiten(terms: tuple[PriorTerm, ...], scales: FloatArray, whitened: FloatArray) -> FloatArray:

@@ -6,16 +6,19 @@ of the input changes by dr, the zero z of H = r_o D^-1 r_i moves by - dH(z) / H'
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import sparse
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.dofs import AnyDof
 from frf_ipz.identification.root_covariance import RootCovariance
+from frf_ipz.numerics.pole_forms import damped_form
 
 if TYPE_CHECKING:
+    from frf_ipz.frf import FrfLabel
     from frf_ipz.updating.problem import UpdateProblem
 
 
@@ -77,30 +80,75 @@ def with_position_uncertainty(
     (2 n, 2 n) array, or RootCovariance
         Of the real and the imaginary part of each target in turn, (rad/s)^2.
     """
-    if not misplacements:
-        return problem.covariance
-    changes = np.zeros((len(problem.values), len(misplacements)), complex)
-    for target in np.flatnonzero(problem.frf >= 0).tolist():
-        changes[target] = _zero_changes(problem, target, misplacements)
-    parts = np.stack([changes.real, changes.imag], axis=1).reshape(2 * len(changes), len(misplacements))
     covariance = problem.covariance
-    if isinstance(covariance, RootCovariance):
-        return replace(covariance, common=np.hstack([covariance.common, parts]))
-    return np.asarray(covariance + parts @ parts.T)
+    if not misplacements or not np.any(problem.frf >= 0):
+        return covariance
+    changes = _zero_changes(problem, misplacements)
+    if not isinstance(covariance, RootCovariance):
+        return np.asarray(covariance + (changes @ changes.T).toarray())
+    is_output = np.array([position.is_output for position in misplacements])
+    # what few positions are is common to many FRFs; each of the many is that of a few FRFs, which become one block
+    is_common = is_output if 2 * is_output.sum() < len(is_output) else ~is_output
+    own = changes[:, ~is_common]
+    return RootCovariance(
+        common=np.hstack([covariance.common, changes[:, is_common].toarray()]),
+        blocks=sparse.csr_array(covariance.blocks + own @ own.T),
+    )
 
 
-def _zero_changes(problem: UpdateProblem, target: int, misplacements: tuple[PositionUncertainty, ...]) -> ComplexArray:
-    """Change of a zero by one standard deviation of each position, rad/s."""
-    model, zero, frf = problem.model, complex(problem.computed[target]), int(problem.frf[target])
-    label = problem.labels[frf]
-    output, force = problem.rows(frf)
-    dynamic = zero**2 * model.mass + zero * model.damping + model.stiffness
-    motion, adjoint = np.linalg.solve(dynamic, force), np.linalg.solve(dynamic.T, output)
-    slope = -adjoint @ (2 * zero * model.mass + model.damping) @ motion
-    value_changes = [
-        position.row @ (motion if position.is_output else adjoint)
-        if position.dof == (label.output_dof if position.is_output else label.input_dof)
-        else 0.0
-        for position in misplacements
-    ]
-    return np.asarray(-np.array(value_changes, complex) / slope)
+def _zero_changes(
+    problem: UpdateProblem, misplacements: tuple[PositionUncertainty, ...]
+) -> sparse.csc_array[np.float64]:
+    """Change of real and imaginary part of each target in turn by one standard deviation of each position, rad/s."""
+    zeros = np.flatnonzero(problem.frf >= 0)
+    motions, adjoints, slopes = _motions(problem, zeros)
+    labels = [problem.labels[frf] for frf in problem.frf[zeros].tolist()]
+    of_output, of_input = (_places([ends(label) for label in labels]) for ends in (_output, _input))
+    columns, rows, values = [], [], []
+    for column, position in enumerate(misplacements):
+        mine = (of_output if position.is_output else of_input).get(position.dof, np.zeros(0, np.int64))
+        moved = -position.row @ (motions if position.is_output else adjoints)[:, mine] / slopes[mine]
+        rows.append((2 * zeros[mine, None] + np.arange(2)).ravel())
+        values.append(np.stack([moved.real, moved.imag], axis=1).ravel())
+        columns.append(np.full(2 * len(mine), column))
+    at = np.concatenate(rows), np.concatenate(columns)
+    return sparse.csc_array(
+        (np.concatenate(values), at), shape=(2 * len(problem.values), len(misplacements)), dtype=np.float64
+    )
+
+
+def _output(label: FrfLabel) -> AnyDof:
+    return label.output_dof
+
+
+def _input(label: FrfLabel) -> AnyDof:
+    return label.input_dof
+
+
+def _places(dofs: list[AnyDof]) -> dict[AnyDof, IntArray]:
+    """Where each DOF stands in a list."""
+    found: dict[AnyDof, list[int]] = {}
+    for place, dof in enumerate(dofs):
+        found.setdefault(dof, []).append(place)
+    return {dof: np.array(places) for dof, places in found.items()}
+
+
+def _motions(problem: UpdateProblem, zeros: IntArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Motion at zeros under a unit force, that of the adjoint under one at the sensor, and slope of the FRF."""
+    model, values = problem.model, problem.computed[zeros]
+    rows = {frf: problem.rows(frf) for frf in np.unique(problem.frf[zeros]).tolist()}
+    outputs, inputs = (np.array([rows[frf][side] for frf in problem.frf[zeros].tolist()]) for side in range(2))
+    form = damped_form(model.mass, model.damping, model.stiffness)
+    roots, exact = form.roots(outputs, inputs, values)
+    motions, adjoints = np.empty_like(roots.right_vectors), np.empty_like(roots.left_vectors)
+    for scaled, loads, result in ((roots.right_vectors, inputs, motions), (roots.left_vectors, outputs, adjoints)):
+        force = values**2 * (model.mass @ scaled) + values * (model.damping @ scaled) + model.stiffness @ scaled
+        with np.errstate(divide="ignore", invalid="ignore"):  # what is not exact is computed below
+            result[:] = scaled * (np.sum(loads**2, axis=1) / np.sum(force * loads.T, axis=0))
+    for place in np.flatnonzero(~exact | ~np.isfinite(motions + adjoints).all(axis=0)).tolist():
+        zero = values[place]
+        dynamic = zero**2 * model.mass + zero * model.damping + model.stiffness
+        motions[:, place] = np.linalg.solve(dynamic, inputs[place])
+        adjoints[:, place] = np.linalg.solve(dynamic.T, outputs[place])
+    by_s = 2 * values * (model.mass @ motions) + model.damping @ motions
+    return motions, adjoints, np.asarray(-np.sum(adjoints * by_s, axis=0))

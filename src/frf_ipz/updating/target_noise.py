@@ -1,19 +1,22 @@
 """Covariance of targets that is never formed as a whole, and its Cholesky factor, block by block.
 
-All targets share the errors of the poles; beyond that the zeros of one FRF share that FRF's noise alone. So the
-covariance is ``common common^T`` and a block on the diagonal for each FRF, and what it costs grows as the targets do.
+All targets share the errors of the poles; beyond that the zeros of one FRF share that FRF's noise alone, and those of
+one sensor its position. So the covariance is ``common common^T`` and a block for each sensor, and what it costs grows
+as the targets do.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 from scipy.linalg import cholesky, solve_triangular
+from scipy.sparse.csgraph import connected_components
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.identification.root_covariance import RootCovariance
 
 if TYPE_CHECKING:
@@ -29,17 +32,22 @@ class TargetNoise:
     common : (n, c) array
         How each follows the errors that all share.
     blocks : tuple of (m, m) arrays
-        Covariance beyond that, along the diagonal, in the order of the data.
+        Covariance beyond that: one of each group of data.
+    places : tuple of (m,) int arrays
+        The data of each group; one group after the other where they are left out.
     """
 
     common: FloatArray
     blocks: tuple[FloatArray, ...]
+    places: tuple[IntArray, ...] = ()
 
     @property
     def variance(self) -> FloatArray:
         """Diagonal, (n,)."""
-        own = np.concatenate([np.diagonal(block) for block in self.blocks]) if self.blocks else np.zeros(0)
-        return np.asarray(own + np.sum(self.common**2, axis=1))
+        variance = np.sum(self.common**2, axis=1)
+        for part, block in self.parts():
+            variance[part] += np.diagonal(block)
+        return np.asarray(variance)
 
     def plus(self, variance: FloatArray) -> TargetNoise:
         """Add independent noise.
@@ -70,19 +78,22 @@ class TargetNoise:
             Of the quotients.
         """
         blocks = tuple(block / np.outer(sizes[part], sizes[part]) for part, block in self.parts())
-        return TargetNoise(common=self.common / sizes[:, None], blocks=blocks)
+        return replace(self, common=self.common / sizes[:, None], blocks=blocks)
 
-    def parts(self) -> Iterator[tuple[slice, FloatArray]]:
+    def parts(self) -> Iterator[tuple[IntArray, FloatArray]]:
         """Give each block with its place.
 
         Yields
         ------
-        slice, (m, m) array
+        (m,) int array, (m, m) array
             Rows, and the block.
         """
+        if self.places:
+            yield from zip(self.places, self.blocks, strict=True)
+            return
         first = 0
         for block in self.blocks:
-            yield slice(first, first + len(block)), block
+            yield np.arange(first, first + len(block)), block
             first += len(block)
 
     def draw(self, white: FloatArray) -> FloatArray:
@@ -128,19 +139,23 @@ def noise_of(covariance: FloatArray | RootCovariance) -> TargetNoise:
         covariance = RootCovariance(
             common=np.zeros((len(covariance), 0)), blocks=sparse.csr_array(np.asarray(covariance, float))
         )
-    entries = sparse.coo_array(covariance.blocks)
-    count = len(covariance.common)
-    reach = np.arange(count)
-    np.maximum.at(reach, entries.coords[0], entries.coords[1])
-    ends = np.flatnonzero(np.maximum.accumulate(reach) == np.arange(count)) + 1
-    starts = np.concatenate([[0], ends[:-1]])
     blocks = sparse.csr_array(covariance.blocks)
+    count, group = connected_components(blocks, directed=False)
+    order = np.argsort(group, kind="stable")
+    places = np.split(order, np.cumsum(np.bincount(group, minlength=count))[:-1])
+    turned = sparse.csr_array(blocks[order][:, order])
     return TargetNoise(
         common=covariance.common,
         blocks=tuple(
-            blocks[first:end, first:end].toarray() for first, end in zip(starts.tolist(), ends.tolist(), strict=True)
+            turned[first:end, first:end].toarray() for first, end in _bounds([len(place) for place in places])
         ),
+        places=tuple(places),
     )
+
+
+def _bounds(sizes: list[int]) -> list[tuple[int, int]]:
+    ends = list(accumulate(sizes, initial=0))
+    return list(pairwise(ends))
 
 
 def project(covariance: FloatArray | RootCovariance, gradient: FloatArray) -> TargetNoise:

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
 from frf_ipz.updating.gaussian import (
+    distance_to_optimum,
     draw_posterior,
     linearise,
     most_contradicted,
@@ -42,7 +43,7 @@ def many():
 def whole(noise):
     matrix = noise.common @ noise.common.T
     for part, block in noise.parts():
-        matrix[part, part] += block
+        matrix[np.ix_(part, part)] += block
     return matrix
 
 
@@ -192,3 +193,60 @@ def test_the_search_for_scales_stays_within_reason(size):
     linear = linearise(parts, size * rng.standard_normal(9), noise_of(1e-16 * np.eye(9)))
     scales = most_likely_scales(linear, terms, np.full(3, 0.1))
     assert np.all(np.abs(np.log(scales / 0.1)) <= 6.0 + 1e-9)
+
+
+def test_what_no_datum_moves_keeps_its_prior_and_takes_no_column():
+    """Sixty parameters of which the data see three combinations, and a fourth too faintly to matter."""
+    rng = np.random.default_rng(5)
+    seen = np.linalg.qr(rng.standard_normal((60, 4)))[0]
+    sensitivity = rng.standard_normal((30, 4)) @ (np.array([1.0, 1.0, 1.0, 1e-5])[:, None] * seen.T)
+    data, noise = rng.standard_normal(30), noise_of(0.1 * np.eye(30))
+    linear = linearise([sensitivity], data, noise)
+    step = solve_step(linear, np.ones(1))
+    mean, covariance = posterior(sensitivity, data, 0.1 * np.eye(30))
+    assert linear.parts[0].shape == (30, 3)
+    assert_allclose(step.mean, mean, atol=1e-3)
+    assert_allclose(step.n_determined, np.trace(np.eye(60) - covariance), rtol=1e-6)
+    members = draw_posterior(step, linear, np.ones(1), noise, np.random.default_rng(1), 2000, factor=0.0)
+    assert np.abs((members @ seen[:, 3]).std() - 1) < 0.1
+    assert np.abs((members @ seen[:, 0]).std() - np.sqrt(seen[:, 0] @ covariance @ seen[:, 0])) < 0.05
+
+
+def test_sums_over_the_data_serve_for_every_slack(many):
+    sensitivity, data, noise = many
+    linear = linearise([sensitivity], data, noise, np.ones(len(data)))
+    factors = np.random.default_rng(8).permutation(np.geomspace(0.3, 3.0, 30))  # a search goes to and fro
+    for factor in factors:
+        root, right = linear.information(np.ones(1), float(factor))
+        alone = linearise([sensitivity], data, noise, np.ones(len(data)))
+        expected, its_right = alone.information(np.ones(1), float(factor))
+        assert_allclose(root, expected, rtol=1e-3, atol=1e-3)
+        assert_allclose(right, its_right, rtol=1e-3, atol=1e-3)
+    assert len(linear.sums) < len(factors) / 2
+
+
+def test_the_distance_to_the_optimum_is_in_posterior_deviations(problem):
+    sensitivity, data, noise = problem
+    linear, scales = linearise([sensitivity], data, noise_of(noise)), np.ones(1)
+    step = solve_step(linear, scales)
+    mean, covariance = posterior(*problem)
+    change = np.arange(5) / 10
+
+    def distance(whitened):
+        return distance_to_optimum(linear, step, scales, 0.0, whitened, data - sensitivity @ whitened)
+
+    assert distance(mean) < 1e-9
+    assert_allclose(distance(mean + change), np.sqrt(change @ np.linalg.solve(covariance, change)), rtol=1e-9)
+
+
+def test_groups_of_data_need_not_be_next_to_one_another(many):
+    noise = many[2]
+    matrix = whole(TargetNoise(common=np.zeros((12, 0)), blocks=noise.blocks))
+    order = np.random.default_rng(6).permutation(12)
+    turned = noise_of(matrix[np.ix_(order, order)])
+    assert len(turned.blocks) == 4
+    assert_allclose(whole(turned), matrix[np.ix_(order, order)])
+    assert_allclose(turned.variance, np.diagonal(matrix)[order])
+    sensitivity, data = many[0][order], many[1][order]
+    step = solve_step(linearise([sensitivity], data, turned), np.ones(1))
+    assert_allclose(step.mean, posterior(sensitivity, data, matrix[np.ix_(order, order)])[0], rtol=1e-9)

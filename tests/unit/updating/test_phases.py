@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from frf_ipz.numerics.pencils import Roots
 from frf_ipz.progress import silent
 from frf_ipz.updating.methods import minimal_change
+from frf_ipz.updating.minimal_change import damping
 from frf_ipz.updating.minimal_change.gauss_newton import iterate
 from frf_ipz.updating.minimal_change.modal_frame import frame_of, modal_frame
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import generic_basis, make_structural_basis
 from frf_ipz.updating.problem import make_problem
+from frf_ipz.updating.tracking import TrackedRoots
 from frf_ipz.updating.updated_model import UpdateStatus
 from frf_testbench.updating.study import make_update_case
 
@@ -143,3 +146,12 @@ def test_a_correct_stiffness_does_not_change_with_damping(case):
     assert np.abs(np.abs(damped_roots[is_pole]) / undamped[undamped > 0][: is_pole.sum()] - 1).max() > 0
     updated = minimal_change.update(known, UpdateOptions(ensemble=2), silent).model
     assert np.abs(updated.stiffness - damped.stiffness).max() < UNTOUCHED * np.abs(damped.stiffness).max()
+
+
+def test_the_real_part_of_a_zero_that_has_left_the_axis_is_no_damping():
+    """Squared roots of one on the axis, one of a quadruple, and a real one: +-2i, -+2+-1i, +-3."""
+    squared = np.array([4.0, -3.0 + 4.0j, -9.0], complex)
+    none = np.zeros((0, 3), complex)
+    roots = Roots(values=squared, right_vectors=none, left_vectors=none, slope=np.ones(3, complex))
+    undamped = TrackedRoots(groups=((np.array([0, 2, 1]), roots),))
+    assert damping._real_parts(undamped, 3) == pytest.approx([0.0, 3.0, 2.0])

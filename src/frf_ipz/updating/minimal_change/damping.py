@@ -64,7 +64,7 @@ class DampingPhase:
     sizes : (n,) array
         Sizes to which errors are relative, rad/s.
     noise : TargetNoise
-        Covariance of the targets over their sizes.
+        Covariance of the targets over their sizes, and of what shapes, not damping, make of the real parts.
     pairs : pair of (n_couplings,) int arrays
         Rows and columns of the couplings.
     """
@@ -291,6 +291,8 @@ def damping_phase(
     np.fill_diagonal(shape, 1.0)
     extra, terms = _extra_parameters(basis, inner, dashpots)
     sizes = np.maximum(np.abs(values.real), SMALL_DAMPING * typical_ratio * np.abs(values))
+    target_undamped = nominal_roots(target_roots, np.eye(len(rates)), np.diag(inner.eigenvalues), undamped)
+    from_shapes = _real_parts(target_undamped, len(values)) / sizes
     pairs = np.triu_indices(min(len(rates), MOST_COUPLED_MODES), 1)
     return DampingPhase(
         eigenvalues=inner.eigenvalues,
@@ -299,13 +301,18 @@ def damping_phase(
         dashpots=dashpots,
         extra=extra,
         terms=_prior_terms(len(rates), len(pairs[0]), len(extra), terms),
-        undamped=nominal_roots(target_roots, np.eye(len(rates)), np.diag(inner.eigenvalues), undamped),
+        undamped=target_undamped,
         target_roots=target_roots,
         targets=-values.real,
         sizes=sizes,
         pairs=pairs,
-        noise=noise.over(sizes).plus(np.full(len(values), SMALLEST_NOISE**2)),
+        noise=noise.over(sizes).plus(SMALLEST_NOISE**2 + from_shapes**2),
     )
+
+
+def _real_parts(undamped: TrackedRoots, count: int) -> FloatArray:
+    """Real parts, rad/s, that zeros have without damping: of shapes, they say nothing of damping and are not known."""
+    return np.asarray(np.abs(np.sqrt(-undamped.values(count)).real))
 
 
 def _extra_parameters(

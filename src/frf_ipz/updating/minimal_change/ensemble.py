@@ -84,9 +84,10 @@ def _draw_stiffness(
     mass, stiffness = phase.matrices(theta)
     # the poles predicted by the linear step are imposed: far from the mean, second-order terms would blur them
     poles = np.flatnonzero(phase.target_roots.frf < 0)
-    sensitivity = np.concatenate(
-        [rows[phase.target_roots.frf[part] < 0] for part, rows in result.linear.sensitivity(result.scales[:-1])]
-    )
+    sensitivity = np.empty((len(poles), sum(part.shape[1] for part in result.linear.parts)))
+    for place, rows in result.linear.sensitivity(result.scales[:-1]):
+        is_pole = phase.target_roots.frf[place] < 0
+        sensitivity[np.searchsorted(poles, place[is_pole])] = rows[is_pole]
     predicted = (phase.targets - result.error)[poles] + result.linear.combined(
         whitened - result.step.mean
     ) @ sensitivity.T

@@ -12,14 +12,20 @@ from typing import Protocol
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.updating.gaussian import GaussianStep, Linearised, linearise, most_likely_scales, step_by_discrepancy
+from frf_ipz.updating.gaussian import (
+    GaussianStep,
+    Linearised,
+    distance_to_optimum,
+    linearise,
+    most_likely_scales,
+    step_by_discrepancy,
+)
 from frf_ipz.updating.parameters import PriorTerm, unwhiten
 from frf_ipz.updating.target_noise import TargetNoise
 from frf_ipz.updating.tracking import TrackedRoots
 
 MAX_ITERATIONS = 30
-CONVERGED_ERROR = 0.3  # standard deviations between the roots and the prediction of the last linear step
-CONVERGED_STEP = 0.03  # prior standard deviations by which parameters changed: the optimum, whatever the misfit
+CONVERGED = 0.03  # posterior standard deviations from the optimum, all directions together
 MET = 0.1  # of the number of targets: a misfit so far below that of noise needs no further step
 MAX_HALVINGS = 6
 CURVATURE = 0.5  # of the squared error at first, then of the error of the last linear prediction: counts as noise
@@ -174,6 +180,7 @@ def iterate(
     *,
     start: FloatArray | None = None,
     scales: FloatArray | None = None,
+    likely: FloatArray | None = None,
     max_iterations: int | None = None,
 ) -> PhaseResult:
     """Iterate the roots to their targets.
@@ -188,6 +195,8 @@ def iterate(
         Unit normal numbers of the prior terms to start from; 0 by default.
     scales : (t + 1,) array, optional
         Standard deviations of the prior terms and the factor on the slack, if they are to be held.
+    likely : (t,) array, optional
+        Standard deviations of the prior terms from which the search for the most likely ones starts.
     max_iterations : int, optional
         Largest number of iterations.
 
@@ -204,6 +213,8 @@ def iterate(
         ),
     )
     scales = np.array([term.std for term in terms]) if scales is None else scales.copy()
+    if likely is not None:
+        scales[:-1] = likely
     whitened = np.zeros(sum(term.root.shape[1] for term in phase.terms)) if start is None else start
     state = _Iterate(whitened, unwhiten(phase.terms, scales[:-1], whitened), tracked, phase.errors(tracked))
     nonlinearity, rows, converged = CURVATURE * state.error**2, [], False
@@ -211,7 +222,7 @@ def iterate(
         slopes = phase.slopes(state.theta, state.tracked)
         parts = [term.by_whitened(slopes) for term in phase.terms]
         data = state.error + slopes @ state.theta
-        linear = linearise(parts, data, phase.noise.plus(nonlinearity**2), phase.slack)
+        linear = linearise(parts, data, phase.noise.plus(nonlinearity**2), phase.slack, scales=scales[:-1])
         if not scales_are_held and iteration <= SCALE_ITERATIONS:
             new_scales = most_likely_scales(linear, terms, scales)
             state = replace(state, whitened=_rescaled(phase.terms, scales / new_scales, state.whitened))
@@ -228,7 +239,8 @@ def iterate(
             nonlinearity = STALLED * np.maximum(nonlinearity, np.sqrt(noise.variance))
         row = _history_row(terms, iteration, state.error, noise, step, scales, fraction)
         rows.append(row | phase.history_columns(state.theta))
-        converged = fraction == 1 and _has_converged(noise, deviation, state.whitened - before.whitened)
+        distance = distance_to_optimum(linear, step, scales[:-1], float(scales[-1]), state.whitened, state.error)
+        converged = distance < CONVERGED
         if converged or rows[-1]["misfit"] < MET * len(data):
             converged = True
             break
@@ -249,18 +261,16 @@ def iterate(
 def _explained(linear: Linearised, scales: FloatArray, mean: FloatArray) -> FloatArray:
     """Give what the parameters make of the data."""
     combined = linear.combined(mean)
-    return np.concatenate([rows @ combined for _, rows in linear.sensitivity(scales)])
+    explained = np.empty(len(linear.data))
+    for place, rows in linear.sensitivity(scales):
+        explained[place] = rows @ combined
+    return explained
 
 
 def _rescaled(terms: tuple[PriorTerm, ...], factors: FloatArray, whitened: FloatArray) -> FloatArray:
     """Whitened parameters of the same parameters under other scales."""
     sizes = [term.root.shape[1] for term in terms]
     return np.asarray(whitened * np.repeat(factors[: len(terms)], sizes))
-
-
-def _has_converged(noise: TargetNoise, deviation: FloatArray, change: FloatArray) -> bool:
-    is_as_predicted = bool(np.all(deviation < CONVERGED_ERROR * np.sqrt(noise.variance)))
-    return is_as_predicted or float(np.abs(change).max()) < CONVERGED_STEP
 
 
 def _line_search(

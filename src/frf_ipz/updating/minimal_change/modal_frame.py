@@ -135,7 +135,16 @@ def modal_parameters(frame: ModalFrame, basis: ParameterBasis) -> ParameterBasis
     """
     return replace(
         basis,
-        mass=frame.to_modal(basis.mass),
-        damping=frame.to_modal(basis.damping),
-        stiffness=frame.to_modal(basis.stiffness),
+        mass=_to_modal(frame, basis.mass),
+        damping=_to_modal(frame, basis.damping),
+        stiffness=_to_modal(frame, basis.stiffness),
     )
+
+
+def _to_modal(frame: ModalFrame, matrices: FloatArray) -> FloatArray:
+    """Transform those that are not zero, one by one: the others take neither time nor memory."""
+    result = np.zeros(matrices.shape)
+    for transformed, matrix in zip(result, matrices, strict=True):
+        if np.any(matrix):
+            transformed[:] = frame.to_modal(matrix)
+    return result

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import IntArray
+from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.updating.gaussian import linearise, most_contradicted, most_likely_scales
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ TOLERANCE = 1e-4  # relative error that counts as met in any case
 INSENSITIVE = 1e-3  # relative change by the prior's standard deviations below which no parameter moves a target
 
 
-def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots) -> IntArray:
+def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots) -> tuple[IntArray, FloatArray]:
     """Find targets that all others contradict: mostly pairs that join two different modes.
 
     Parameters
@@ -36,8 +36,10 @@ def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots) -> IntArray
 
     Returns
     -------
-    (k,) int array
+    outliers : (k,) int array
         Indices of the targets to exclude.
+    scales : (t,) array
+        Most likely standard deviations of the prior terms without them.
     """
     theta = np.zeros(len(phase.basis.names))
     error = phase.errors(start)
@@ -47,14 +49,15 @@ def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots) -> IntArray
     scales = np.array([term.std for term in phase.terms])
     outliers: list[int] = []
     while len(outliers) <= MAX_SHARE * len(error):
-        linear = linearise(parts, error, noise)
+        linear = linearise(parts, error, noise, scales=scales)
         scales = most_likely_scales(linear, phase.terms, scales)
         worst = most_contradicted(linear, scales, CONTRADICTED, least=MIN_ERROR)
         if worst < 0:
-            return np.array(outliers, int)
+            return np.array(outliers, int), scales
         outliers.append(worst)
         noise = noise.plus(EXCLUDED_STD**2 * (np.arange(len(error)) == worst))
-    return np.array([], int)  # so many contradictions are no exception: the model is far off, and all targets count
+    # so many contradictions are no exception: the model is far off, and all targets count
+    return np.array([], int), np.array([term.std for term in phase.terms])
 
 
 def unmet_targets(result: PhaseResult, names: tuple[str, ...], excluded: IntArray) -> tuple[str, ...]:
@@ -75,7 +78,9 @@ def unmet_targets(result: PhaseResult, names: tuple[str, ...], excluded: IntArra
         One sentence each.
     """
     deviation = np.sqrt(result.noise.variance)
-    reach = np.concatenate([np.linalg.norm(rows, axis=1) for _, rows in result.linear.sensitivity(result.scales[:-1])])
+    reach = np.empty(len(names))
+    for place, rows in result.linear.sensitivity(result.scales[:-1]):
+        reach[place] = np.linalg.norm(rows, axis=1)
     texts = []
     for target, name in enumerate(names):
         error = f"the {name} stays {abs(result.error[target]):.2g} of its value off"

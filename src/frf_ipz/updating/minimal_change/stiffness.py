@@ -152,8 +152,15 @@ class StiffnessPhase:
         for indices, roots in tracked.groups:
             change = self.by_stiffness.forms(roots.left_vectors, roots.right_vectors)
             if self.changes_mass:
-                change = change - roots.values[:, None] * self.by_mass.forms(roots.left_vectors, roots.right_vectors)
-            result[indices] = 0.5 * (change / (roots.slope * roots.values)[:, None]).real
+                by_mass = self.by_mass.own_forms(roots.left_vectors, roots.right_vectors)
+                is_real = np.isrealobj(change) and np.isrealobj(by_mass) and not np.any(roots.values.imag)
+                values = roots.values.real if is_real else roots.values
+                change = change if is_real else change.astype(complex)
+                change[:, self.by_mass.owners] -= values[:, None] * by_mass
+            scale = 0.5 / (roots.slope * roots.values)
+            result[indices] = scale.real[:, None] * change.real
+            if np.any(change.imag):
+                result[indices] -= scale.imag[:, None] * change.imag
         return result * self.basis.slopes(theta)
 
     def history_columns(self, theta: FloatArray) -> dict[str, float]:
