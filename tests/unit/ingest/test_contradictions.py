@@ -157,12 +157,22 @@ def test_the_majority_decides(tmp_path):
     assert truth_error(result).max() < 0.01
 
 
+def test_two_impacts_that_differ_by_a_gain_are_said_to(tmp_path):
+    def amplify(signals):
+        signals[1:] *= 1.5
+        return signals
+
+    (text,) = estimate(tmp_path, amplify, impacts=2, bad=(1,)).warnings
+    assert "contradict each other: their FRFs differ by acc_1 39 %, acc_2 39 % (rms)" in text
+    assert not estimate(tmp_path / "sound", amplify, impacts=2, bad=()).warnings
+
+
 def test_of_two_impacts_none_is_right(tmp_path):
     result = estimate(tmp_path, reverse_all, impacts=2, bad=(1,))
     (text,) = result.warnings
     assert text == (
         "hits/hit_1.csv and hits/hit_2.csv contradict each other: acc_1 and acc_2 agree only with the opposite sign; "
-        "which is right does not show in two"
+        "which is right does not show in two: drop one by [ingest] drop, or record a third"
     )
     exchanged = estimate(tmp_path / "exchanged", exchange, impacts=2, bad=(1,))
     assert "acc_1 and acc_2 agree only when exchanged" in exchanged.warnings[0]

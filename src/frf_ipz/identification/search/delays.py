@@ -181,8 +181,8 @@ def measure_delay(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms,
         _misfit(_normal(lines.advanced(np.full(n_frfs, delay_s + change))), poles, terms)
         for change in (-step, 0.0, step)
     )
-    curvature = max((before - 2 * at + after) / step**2, np.finfo(float).tiny)
-    by_noise = float(np.sqrt(2 / curvature * max(1.0, at / (2.0 * lines.receptance.size))))
+    curvature = (before - 2 * at + after) / step**2
+    by_noise = float(np.sqrt(2 / curvature * max(1.0, at / (2.0 * lines.receptance.size)))) if curvature > 0 else np.inf
     each = find_delays(_normal(lines.advanced(np.full(n_frfs, delay_s))), poles, terms, np.arange(n_frfs))
     return CommonDelay(delay_s=delay_s, std_s=max(by_noise, _std_of_median(each)))
 

@@ -145,17 +145,35 @@ def _fit_late_responses(
     known_s = 0.0 if fitted is None or fitted.common_delay is None else fitted.common_delay.delay_s
     if abs(arrival_s - known_s) * lines.band_hz[1] < FAR_OFF:
         return None
-    advanced = replace(frfs, values=frfs.values * np.exp(frfs.s[:, None] * arrival_s))
-    try:
-        late = _find_modes(advanced, measured_lines(advanced, options), options, silent)
-    except NoModesError:
+    # an arrival is late where modes beat: the grid of delays reaches a period before it, so further ones are tried
+    best: tuple[float, FittedModes] | None = None
+    for periods in (0.0, 1.0, 2.0):
+        first_s = arrival_s - periods / lines.band_hz[1]
+        late = _fit_from(frfs, first_s, options)
+        if late is not None and (best is None or np.median(late.misfit_ratio) < np.median(best[1].misfit_ratio)):
+            best = first_s, late
+        if best is not None and np.median(best[1].misfit_ratio) < MODEL_ERROR:
+            break
+    if best is None:
         return None
+    first_s, late = best
     if fitted is not None and np.median(late.misfit_ratio) > LATE_MISFIT * np.median(fitted.misfit_ratio):
         return None
-    delay_s = arrival_s + float(late.delay_s[0])
+    delay_s = first_s + float(late.delay_s[0])
     weighed = replace(late.lines, variance=late.noise).advanced(np.full(frfs.n_frfs, -delay_s))
     delay = measure_delay(weighed, late.fit.poles, late.terms, delay_s)
+    if not np.isfinite(delay.std_s):
+        return None
     return replace(late, delay_s=np.full(frfs.n_frfs, delay_s), common_delay=delay)
+
+
+def _fit_from(frfs: FrfSet, first_s: float, options: FitOptions) -> FittedModes | None:
+    """Fit without a first delay; None where no mode is found."""
+    advanced = replace(frfs, values=frfs.values * np.exp(frfs.s[:, None] * first_s))
+    try:
+        return _find_modes(advanced, measured_lines(advanced, options), options, silent)
+    except NoModesError:
+        return None
 
 
 def _fit_delayed_channels(frfs: FrfSet, fitted: FittedModes, options: FitOptions) -> FittedModes | None:

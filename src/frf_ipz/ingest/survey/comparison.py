@@ -16,6 +16,7 @@ from frf_ipz.ingest.survey.contradictions import (
     ImpactSpectra,
     compare_output,
     contradicts_pairwise,
+    difference_of_pair,
     follows_force,
     leave_out,
     noise_scales,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 CONTRADICTS = "contradicts the other impacts"
 OPPOSITE = "its sign is the opposite"
 UNNAMED = ""
+DISAGREE = 0.12  # of the FRF, 1 dB: two impacts that differ by more are no repetition
 FEWEST_LINES = 64  # that are compared, however many impacts there are: a band of the scatter's fit
 
 
@@ -267,4 +269,9 @@ def _warn_of_pair(files: RecordingFiles, records: Sequence[RecordInfo], spectra:
         pair = replace(spectra, responses=exchanged)
         if contradicts_pairwise(pair, first) and contradicts_pairwise(pair, second):
             texts.append(f"{columns[first]} and {columns[second]} agree only when exchanged")
-    return [f"{names} contradict each other: {text}; which is right does not show in two" for text in texts]
+    if not texts:
+        differences = {columns[output]: difference_of_pair(spectra, output) for output in shared}
+        listed = ", ".join(f"{column} {100 * part:.0f} %" for column, part in differences.items() if part > DISAGREE)
+        texts += [f"their FRFs differ by {listed} (rms)"] if listed else []
+    advice = "which is right does not show in two: drop one by [ingest] drop, or record a third"
+    return [f"{names} contradict each other: {text}; {advice}" for text in texts]

@@ -294,6 +294,29 @@ def contradicts_pairwise(spectra: ImpactSpectra, output: int) -> bool:
     return bool(opposite < LEVEL * same)
 
 
+def difference_of_pair(spectra: ImpactSpectra, output: int) -> float:
+    """Tell by how much two impacts differ in one response.
+
+    Parameters
+    ----------
+    spectra : ImpactSpectra
+        Two impacts.
+    output : int
+        Which response.
+
+    Returns
+    -------
+    float
+        Root mean square of the difference of their FRFs over that of the FRFs, without what their noise makes.
+    """
+    (first_force, second_force), (first, second) = spectra.force, spectra.responses[:, output]
+    power = np.abs(spectra.force) ** 2
+    noise = np.sum(power[1] * spectra.noise[0, output] + power[0] * spectra.noise[1, output])
+    difference = np.sum(np.abs(first * second_force - second * first_force) ** 2)
+    size = 0.5 * np.sum(np.abs(first * second_force) ** 2 + np.abs(second * first_force) ** 2)
+    return float(np.sqrt(max(difference - noise, 0.0) / size)) if size else 0.0
+
+
 def _nearest_majority(force: ComplexArray, response: ComplexArray) -> list[int]:
     """Find the impact and its nearest neighbours, more than half of all, that agree best."""
     count = len(force)
