@@ -220,6 +220,7 @@ def with_tables(fit, frfs):
         decisions=pd.DataFrame(decisions),
         misfit=pd.DataFrame(misfit),
         modes=pd.DataFrame(modes),
+        frequency_hz=used.frequency_hz,
         value_std=0.2 * np.sqrt(used.variance),
     )
 

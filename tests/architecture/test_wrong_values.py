@@ -68,6 +68,10 @@ def calls():
     points = {"points": ["9:+z", 7, ["text"], ["99:+z"], [3]]}
     model_points = {"measured": g.fit, "updated_model": g.updated_model}
     return {
+        "band_of_magnitudes": (
+            model_points | {"labels": g.labels, "s": s},
+            {"labels": [["1:x"], 3], "s": [np.zeros(3), np.array([np.nan]), np.ones((2, 2)), "text"]},
+        ),
         "compare_frfs": (
             {"first": np.ones((2, 1)), "second": np.ones((2, 1))},
             {"second": [np.ones((3, 1)), np.ones(2)]},

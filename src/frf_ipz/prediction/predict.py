@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arguments import require_type, take_array
+from frf_ipz.arguments import require_each, require_type, take_array
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.dofs import AnyDof, as_dofs
 from frf_ipz.errors import InputError
@@ -175,6 +175,7 @@ def band_of_magnitudes(
     """
     require_measured(measured)
     require_type("updated_model", updated_model, UpdatedModel)
+    require_each("labels", labels, FrfLabel)
     s = take_array("the lines", s, np.complex128)
     if not s.any():
         raise InputError("all lines are 0; at least one above 0 is needed")
