@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+MODULES_AT_START = 210  # of 620 in all: those of options, files, the model, and the first stage
 SOURCE = Path(__file__).parents[2] / "src" / "frf_ipz"
 
 
@@ -21,6 +22,14 @@ def test_importing_the_package_leaves_heavy_packages_alone():
 def test_importing_the_command_leaves_heavy_packages_alone():
     loaded = modules_after("import frf_ipz.cli.main")
     assert not loaded & {"matplotlib", "control", "plotly", "pandas", "scipy", "numpy", "pyarrow"}
+
+
+def test_a_chain_starts_without_what_only_later_stages_need():
+    """What is imported costs more than the first stages of a small test; counted, as seconds differ by machine."""
+    loaded = modules_after("import frf_ipz.cli.main, frf_ipz.pipeline.run")
+    heavy = {"pandas", "pyarrow", "scipy.stats", "scipy.optimize", "scipy.signal", "scipy.interpolate", "scipy.ndimage"}
+    assert not loaded & {*heavy, "jinja2", "joblib", "h5py", "frf_ipz.diagnosis.diagnose", "frf_ipz.report.page"}
+    assert len([name for name in loaded if name.startswith("frf_ipz.")]) <= MODULES_AT_START
 
 
 def test_imports_stand_at_the_top():

@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 
 import frf_ipz
-from frf_ipz.export.parquet import KINDS
 from frf_ipz.export.run_tables import FILES, frame_table
 from frf_ipz.runs.summary import summarise
 
@@ -72,5 +71,5 @@ def test_every_table_of_a_run_takes_an_empty_result(name):
     for empty in (pd.DataFrame({column.name: [] for column in FILES[name]}), pd.DataFrame()):
         table = frame_table(empty, FILES[name])
         assert table.num_rows == 0
-        by_name = {column.name: KINDS[column.kind] for column in FILES[name]}
+        by_name = {column.name: column.field.type for column in FILES[name]}
         assert all(field.type == by_name[field.name] for field in table.schema)

@@ -7,15 +7,20 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.display import Concise, Drawn, Tabulated
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel
+from frf_ipz.late_imports import import_late
+
+if TYPE_CHECKING:
+    import pandas as pd
+else:
+    pd = import_late("pandas")
 
 
 class DiagnosisVerdict(StrEnum):

@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-import pandas as pd
-
 from frf_ipz.assessment.assessment import Assessment, Check
 from frf_ipz.diagnosis.result import Diagnosis, Estimate
 from frf_ipz.errors import InputError, did_you_mean
@@ -15,14 +13,18 @@ from frf_ipz.export import run_tables
 from frf_ipz.frf import FrfSet
 from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.ingest.frf_estimate import FrfEstimate
+from frf_ipz.late_imports import import_late
 from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.prediction.prediction import Prediction
 from frf_ipz.updating.updated_model import UpdatedModel
 
 if TYPE_CHECKING:
+    import pandas as pd
     import pyarrow as pa
+else:
+    pd = import_late("pandas")
 
-MakeFrame: TypeAlias = Callable[[Any], pd.DataFrame]
+MakeFrame: TypeAlias = "Callable[[Any], pd.DataFrame]"
 
 
 def to_frame(result: object, table: str | None = None) -> pd.DataFrame:

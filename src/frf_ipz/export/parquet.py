@@ -8,15 +8,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
+from frf_ipz.late_imports import import_late
 from frf_ipz.output_files import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-KINDS = {"float": pa.float64(), "int": pa.int64(), "text": pa.string(), "flag": pa.bool_()}
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+else:
+    pa, pq = import_late("pyarrow"), import_late("pyarrow.parquet")
+
+KINDS = {"float": "float64", "int": "int64", "text": "string", "flag": "bool_"}  # names of Arrow's types
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +48,7 @@ class Column:
     @property
     def field(self) -> pa.Field:
         """The Arrow field with its metadata."""
-        return pa.field(self.name, KINDS[self.kind], metadata={"unit": self.unit, "meaning": self.meaning})
+        return pa.field(self.name, _arrow_type(self.kind), metadata={"unit": self.unit, "meaning": self.meaning})
 
 
 def declared_column(columns: Sequence[Column], name: str) -> Column:
@@ -158,10 +162,14 @@ def write_table(table: pa.Table, path: Path) -> None:
         pq.write_table(table, target, compression="zstd")
 
 
+def _arrow_type(kind: str) -> Any:  # noqa: ANN401 - Arrow has no type hints
+    return getattr(pa, KINDS[kind])()
+
+
 def _array(values: Any, column: Column) -> pa.Array:  # noqa: ANN401  what Arrow takes has no common type
     if isinstance(values, pa.Array):
         return values
     if not len(values):  # an empty column of a data frame has no type of its own: the declared one counts
-        return pa.array([], KINDS[column.kind])
+        return pa.array([], _arrow_type(column.kind))
     plain = np.ascontiguousarray(values) if isinstance(values, np.ndarray) else list(values)
-    return pa.array(plain, KINDS[column.kind], from_pandas=column.kind == "float")
+    return pa.array(plain, _arrow_type(column.kind), from_pandas=column.kind == "float")

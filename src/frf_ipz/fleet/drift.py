@@ -8,12 +8,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from scipy import stats
+
     from frf_ipz.arrays import FloatArray
+else:
+    stats = import_late("scipy.stats")
 
 FEWEST = 5  # machines with a date or a number
 DIGITS = re.compile(r"[0-9]+")

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import BoolArray, FloatArray
@@ -73,7 +73,7 @@ def find_outliers(values: FloatArray, std: FloatArray, *, level: float) -> Devia
     clean[suspects] = False
     sigma = np.array([_deviation(values, std, clean, place) for place in range(n)])
     n_clean = int(clean.sum())
-    limit = stats.t.isf(level / 2 / (2 * n), n_clean - 1)
+    limit = -special.stdtrit(n_clean - 1, level / 2 / (2 * n))
     is_outlier = ~clean & (np.abs(sigma) > limit)  # one that was measured badly may be far off by that alone
     return Deviations(sigma=sigma, is_outlier=is_outlier)
 
@@ -94,7 +94,7 @@ def _extreme(values: FloatArray, level: float) -> list[int]:
         if not spread > 0:
             break
         share = level if steps == 1 else level / 2 if step == 0 else level / 2 / (steps - 1)
-        t = stats.t.isf(share / (2 * count), count - 2)
+        t = -special.stdtrit(count - 2, share / (2 * count))
         limit = (count - 1) * t / np.sqrt((count - 2 + t**2) * count)
         removed.append(remaining.pop(farthest))
         if distances[farthest] > limit * spread:

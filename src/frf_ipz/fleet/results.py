@@ -6,18 +6,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-
 from frf_ipz.arguments import as_path
 from frf_ipz.errors import FileFormatError, InputError, did_you_mean
 from frf_ipz.fleet.summary import summarise
 from frf_ipz.fleet.tables import FILES
 from frf_ipz.input_files import require_regular_file
 from frf_ipz.json_files import read_json
+from frf_ipz.late_imports import import_late
 from frf_ipz.runs.results import Results, open_results
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    import pandas as pd
+else:
+    pd = import_late("pandas")
 
 FLEET = "fleet.parquet"
 POPULATION, ENSEMBLE, PAGE = "population.json", "population_ensemble.mat", "fleet.html"

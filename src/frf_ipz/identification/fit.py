@@ -7,9 +7,9 @@ support them. Then errors of everything, from the Fisher information at the opti
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from scipy import sparse
 
 from frf_ipz.arguments import require_type, take_array
@@ -49,10 +49,16 @@ from frf_ipz.identification.search.split_half import (
 )
 from frf_ipz.identification.stabilization import columns_of_modes
 from frf_ipz.identification.stated_modes import take_stated_modes
+from frf_ipz.late_imports import import_late
 from frf_ipz.modes import ModalParameters
 from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.progress import Progress, silent
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
+
+if TYPE_CHECKING:
+    import pandas as pd
+else:
+    pd = import_late("pandas")
 
 NOISE_ROUNDS = 3  # of fitting residues and estimating the noise in turn
 

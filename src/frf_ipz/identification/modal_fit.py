@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arrays import BoolArray, FloatArray, require_shape
 from frf_ipz.display import Drawn, Tabulated
@@ -13,8 +13,14 @@ from frf_ipz.errors import ShapeError
 from frf_ipz.frf import FrfLabel
 from frf_ipz.identification.options import Stability
 from frf_ipz.identification.root_covariance import RootCovariance
+from frf_ipz.late_imports import import_late
 from frf_ipz.modes import ModalParameters
 from frf_ipz.rational import PoleResidueModel, ZeroSet, natural_frequency_hz
+
+if TYPE_CHECKING:
+    import pandas as pd
+else:
+    pd = import_late("pandas")
 
 MODES_SHOWN = 6
 

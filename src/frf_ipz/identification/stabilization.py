@@ -10,16 +10,20 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.identification.options import Stability
+from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.polyreference import denominator, denominator_roots, participation, reduced_normal_matrix
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from frf_ipz.frf import FrfSet
     from frf_ipz.identification.measured_lines import MeasuredLines
+else:
+    pd = import_late("pandas")
 
 MOST_ORDERS = 50  # of the diagram: orders are one apart, and two where there would be more
 TOP_POLES = 150  # poles of the highest order, conjugates counted: twice what the band of a test usually holds

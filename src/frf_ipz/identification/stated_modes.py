@@ -10,16 +10,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.errors import InputError
 from frf_ipz.identification.modal_fit import ModalFit
+from frf_ipz.late_imports import import_late
 from frf_ipz.modes import ModalParameters, modal_phase_collinearity
 from frf_ipz.rational import PoleResidueModel, ZeroSet, underdamped_poles
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from frf_ipz.arrays import FloatArray
     from frf_ipz.identification.options import FitOptions
+else:
+    pd = import_late("pandas")
 
 FREQUENCY_STD, DAMPING_STD = 1e-3, 0.1  # relative, where none is stated
 STATED = "stated"

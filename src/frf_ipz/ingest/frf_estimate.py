@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import partial
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.frf import FrfSet
+from frf_ipz.late_imports import import_late
 from frf_ipz.modes import ModalParameters
+
+if TYPE_CHECKING:
+    import pandas as pd
+else:
+    pd = import_late("pandas")
 
 COHERENCES = ("frequency_hz", "output_dof", "input_dof", "ordinary_coherence", "multiple_coherence")
 
@@ -92,7 +96,7 @@ class FrfEstimate(Tabulated, Drawn):
     choices: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     modes: ModalParameters | None = None
-    coherences: pd.DataFrame = field(default_factory=partial(pd.DataFrame, columns=list(COHERENCES)))
+    coherences: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=list(COHERENCES)))
 
     def __repr__(self) -> str:
         if self.modes is not None:

@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arguments import require_each, require_type, take_array
 from frf_ipz.arrays import FloatArray, read_only
@@ -24,7 +23,13 @@ from frf_ipz.ingest.formats.recording import TableKeys
 from frf_ipz.ingest.formats.registry import look_at_recording, open_recording
 from frf_ipz.ingest.recording_files import UniformTimeCheck
 from frf_ipz.ingest.units import is_stated, unit_factor
+from frf_ipz.late_imports import import_late
 from frf_ipz.quantities import RESPONSES
+
+if TYPE_CHECKING:
+    import pandas as pd
+else:
+    pd = import_late("pandas")
 
 WILDCARDS = "*?["
 

@@ -13,12 +13,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from scipy.optimize import linear_sum_assignment
+else:
+    linear_sum_assignment = import_late("scipy.optimize", "linear_sum_assignment")
 
 FORBIDDEN = 1e6  # cost of a pair that must not be
 

@@ -10,15 +10,22 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.observations import WITHOUT_FRFS
 from frf_ipz.errors import InputError
+from frf_ipz.late_imports import import_late
 from frf_ipz.pipeline.stage_runner import StageRunner
-from frf_ipz.pipeline.stages import causes, hints, measurement, mismatch, modelling, outputs
+from frf_ipz.pipeline.stages import measurement, mismatch
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.pipeline.stage_runner import RunStore
+    from frf_ipz.pipeline.stages import causes, hints, modelling, outputs
     from frf_ipz.progress import Progress
+else:
+    causes = import_late("frf_ipz.pipeline.stages.causes")
+    hints = import_late("frf_ipz.pipeline.stages.hints")
+    modelling = import_late("frf_ipz.pipeline.stages.modelling")
+    outputs = import_late("frf_ipz.pipeline.stages.outputs")
 
 STAGES = ("ingest", "fit", "diagnose", "pair", "update", "predict", "export", "report")
 

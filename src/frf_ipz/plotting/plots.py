@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arguments import require_each, require_type, take_array
 from frf_ipz.diagnosis.measured.levels import LevelDependence
@@ -19,6 +18,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfSet
 from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.ingest.frf_estimate import FrfEstimate
+from frf_ipz.late_imports import import_late
 from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.plotting.diagnosis import describe_mismatch, describe_proof, describe_ranking
 from frf_ipz.plotting.figures import draw_panel
@@ -37,11 +37,14 @@ from frf_ipz.updating.updated_model import UpdatedModel
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import pandas as pd
     from matplotlib.axes import Axes
 
     from frf_ipz.arrays import ComplexArray
     from frf_ipz.dofs import AnyDof
     from frf_ipz.plotting.picture import Picture
+else:
+    pd = import_late("pandas")
 
 
 def plot_records(estimate: FrfEstimate, *, ax: Axes | None = None) -> Axes:

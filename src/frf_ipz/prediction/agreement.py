@@ -10,18 +10,22 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from scipy.linalg import eigh
 
 from frf_ipz.arguments import require_type, take_array
 from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
+from frf_ipz.late_imports import import_late
 from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.structure import ReducedModel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import pandas as pd
+
     from frf_ipz.frf import FrfLabel
+else:
+    pd = import_late("pandas")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

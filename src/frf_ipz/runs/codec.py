@@ -15,16 +15,19 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
-import pandas as pd
 from scipy import sparse
 
 from frf_ipz.errors import FileFormatError, FrfIpzError
+from frf_ipz.late_imports import import_late
 from frf_ipz.runs.stage_file import ADVICE, StageFile, read_stage_file, write_stage_file
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import pandas as pd
     from numpy.typing import NDArray
+else:
+    pd = import_late("pandas")
 
 RESULTS = {  # by stage: the whole list of what is ever built from a file, with the types of its fields
     "ingest": "frf_ipz.ingest.frf_estimate:FrfEstimate",
@@ -354,26 +357,31 @@ PACKAGE = "frf_ipz."
 REAL, INTEGER, TEXT, TRUTH = _Scalar(float), _Scalar(int), _Scalar(str), _Scalar(bool)
 ARRAY, SPARSE, FRAME, COMPLEX, NOTHING, PLAIN = _Array(), _Sparse(), _Frame(), _Complex(), _Nothing(), _Plain()
 TUPLE, MAPPING = _Tuple(PLAIN), _Mapping(PLAIN, PLAIN)
-SIMPLE: dict[Any, _Kind] = {
-    float: REAL,
-    int: INTEGER,
-    str: TEXT,
-    bool: TRUTH,
-    complex: COMPLEX,
-    type(None): NOTHING,
-    object: PLAIN,
-    pd.DataFrame: FRAME,
-    np.ndarray: ARRAY,
-    sparse.csr_array: SPARSE,
-}
+
+
+@cache
+def _simple_kinds() -> dict[Any, _Kind]:
+    return {
+        float: REAL,
+        int: INTEGER,
+        str: TEXT,
+        bool: TRUTH,
+        complex: COMPLEX,
+        type(None): NOTHING,
+        object: PLAIN,
+        pd.DataFrame: FRAME,
+        np.ndarray: ARRAY,
+        sparse.csr_array: SPARSE,
+    }
 
 
 @cache
 def _kind(hint: Any) -> _Kind:
     """Find what turns the values of an annotation into a file and back."""
     origin, arguments = get_origin(hint), get_args(hint)
-    if hint in SIMPLE or origin in SIMPLE:
-        return SIMPLE[hint if hint in SIMPLE else origin]
+    simple = _simple_kinds()
+    if hint in simple or origin in simple:
+        return simple[hint if hint in simple else origin]
     if origin in {Union, UnionType}:
         return _Union(tuple(map(_kind, arguments)))
     if origin is tuple:

@@ -6,17 +6,21 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from scipy.linalg import eigh
 
 from frf_ipz.identification.results.shapes import mode_shapes
+from frf_ipz.late_imports import import_late
 from frf_ipz.modes import modal_assurance
 from frf_ipz.updating.targets import Target, target_rows
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
     from frf_ipz.frf import FrfLabel
     from frf_ipz.runs.results import Results
+else:
+    pd = import_late("pandas")
 
 FRFS_SHOWN_AT_FIRST = 6  # the others are a click away
 AT_REST = 1e-9  # of the largest eigenvalue: a rigid-body mode, which no fit has

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arrays import FloatArray
+from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.updating.gaussian import linearise, solve_step
 from frf_ipz.updating.parameters import make_structural_basis
@@ -20,9 +20,13 @@ from frf_ipz.updating.target_noise import TargetNoise
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import pandas as pd
+
     from frf_ipz.structure import ReducedModel, StructuralModel
     from frf_ipz.updating.regions import Region
     from frf_ipz.updating.updated_model import UpdatedModel
+else:
+    pd = import_late("pandas")
 
 BAND = (0.05, 0.95)
 READ_BACK = 0.02  # of the largest entry of a relative change: the part that parts need not explain

@@ -11,13 +11,17 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
+from frf_ipz.late_imports import import_late
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.identification.modal_fit import ModalFit
+else:
+    pd = import_late("pandas")
 
 DB = 20.0 / np.log(10.0)  # of a small relative deviation
 

@@ -23,18 +23,22 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.frf import FrfLabel
+from frf_ipz.late_imports import import_late
 from frf_ipz.pairing.poles import AMPLITUDE_STD, measured_amplitudes
 
 if TYPE_CHECKING:
+    from scipy.optimize import brentq
+
     from frf_ipz.arrays import ComplexArray
     from frf_ipz.dofs import AnyDof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.structure import ReducedModel
+else:
+    brentq = import_late("scipy.optimize", "brentq")
 
 SEED = 0  # of the draws: the same bands from the same inputs
 DRAWS = 200  # without an ensemble

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel
+from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.rigid_motions import meet_no_force, without_force
 from frf_ipz.structure import ReducedModel
 from frf_ipz.updating.expansion import ShapeExpansion
 from frf_ipz.updating.scale import MeasuredScale
+
+if TYPE_CHECKING:
+    import pandas as pd
+else:
+    pd = import_late("pandas")
 
 UNCERTAIN = (
     "the model is left as it was, and nothing tells how wrong it is: predictions have no band, and there are no "
@@ -121,7 +127,7 @@ class UpdatedModel(Tabulated, Drawn):
     ensemble: FloatArray
     unmet: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
-    parts: pd.DataFrame = field(default_factory=pd.DataFrame)
+    parts: pd.DataFrame = field(default_factory=lambda: pd.DataFrame())
     scale: MeasuredScale = field(default_factory=MeasuredScale)
     nominal_scale: MeasuredScale = field(default_factory=MeasuredScale)
     expansion: ShapeExpansion | None = None

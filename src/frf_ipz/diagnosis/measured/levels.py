@@ -13,20 +13,24 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.forces import isolate_pulse
 from frf_ipz.diagnosis.measured.local_pole import LocalPole, fit_local_pole, lines_around_pole
 from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.signals.transients import transform_subrecords
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    import pandas as pd
+
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord
     from frf_ipz.frf import FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
+else:
+    pd = import_late("pandas")
 
 MIN_LEVEL_RATIO = 1.5  # of the strongest to the weakest record of a group: below, there is one level only
 MIN_RECORDS = 2

@@ -10,20 +10,24 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.diagnosis.evidence.inference_problem import compute_weights
 from frf_ipz.diagnosis.model.response import nuisance_jacobian
 from frf_ipz.diagnosis.result import Curves
 from frf_ipz.diagnosis.search.global_scan import MOTIONS_AT_ONCE, evaluate_receptances
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    import pandas as pd
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.evidence.fit import Fit
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
     from frf_ipz.diagnosis.model.motion import Motion
+else:
+    pd = import_late("pandas")
 
 N_SUBBANDS = 6  # subbands, on a logarithmic scale
 DISAGREES = 3.0  # standard deviations

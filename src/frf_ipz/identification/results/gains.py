@@ -13,18 +13,22 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arguments import require_type
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.identification.modal_fit import ModalFit
+from frf_ipz.late_imports import import_late
 from frf_ipz.modes import ModeSet
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import pandas as pd
+
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.frf import FrfLabel
+else:
+    pd = import_late("pandas")
 
 ITERATIONS = 20  # of the ratio of two FRFs; of gains and scales in turn
 UNDETERMINED = 1e-6  # part of a gain that the equations leave open: above, they do not determine it

@@ -5,18 +5,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.identification.results.found_again import found_again
 from frf_ipz.identification.search.split_half import unconfirmed_reasons
+from frf_ipz.late_imports import import_late
 from frf_ipz.modes import modal_assurance, modal_phase_collinearity
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit
     from frf_ipz.identification.search.split_half import SplitHalf
+else:
+    pd = import_late("pandas")
 
 BANDS = 8  # of the misfit table, of equal width
 GOOD, FAIR = 0.9, 2 / 3  # probability to be found again above which a mode is good, or fair: two of three fits have it

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft, stats
+from scipy import fft, special
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 
@@ -89,7 +89,7 @@ def find_candidates(frequency_hz: FloatArray, misfit: ComplexArray, max_count: i
     signal = np.asarray(fft.ifft(gridded, size, axis=1, norm="forward"), np.complex64)
     widths = _half_widths(frequency_hz, line)
     limit = _chance_limit(misfit.shape[1], len(frequency_hz) * len(widths))
-    typical = float(stats.chi2.median(2 * misfit.shape[1]))
+    typical = float(2 * special.gammaincinv(misfit.shape[1], 0.5))
     levels = np.ones(len(widths))
     matches: list[tuple[float, complex]] = []
     templates = _template_energies(grid_indices.tobytes(), tuple(widths.tolist()))
@@ -154,7 +154,7 @@ def _template_energies(grid_indices: bytes, widths: tuple[float, ...]) -> FloatA
 
 
 def _chance_limit(n_frfs: int, n_points: int) -> float:
-    return float(stats.chi2.isf(FALSE_ALARMS / n_points, 2 * n_frfs))
+    return float(special.chdtri(2 * n_frfs, FALSE_ALARMS / n_points))
 
 
 def _peaks(ratio: FloatArray) -> IntArray:

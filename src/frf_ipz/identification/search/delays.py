@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.identification.likelihood.compression import column_gains, compress
@@ -189,7 +189,7 @@ def measure_delay(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms,
 
 def _std_of_median(values: FloatArray) -> float:
     """Give the standard deviation of the median of normally distributed values by their own scatter."""
-    deviation = np.median(np.abs(values - np.median(values))) / stats.norm.ppf(0.75)
+    deviation = np.median(np.abs(values - np.median(values))) / special.ndtri(0.75)
     return float(np.sqrt(np.pi / 2) * deviation / np.sqrt(len(values)))
 
 

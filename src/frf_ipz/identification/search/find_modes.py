@@ -11,7 +11,6 @@ from math import log
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NoModesError
@@ -27,11 +26,16 @@ from frf_ipz.identification.search.drift import Drift
 from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, assess_fit, peak_levels
 from frf_ipz.identification.search.selection import ROUGH_ITERATIONS, SelectedModes, select_modes
 from frf_ipz.identification.stabilization import find_start_poles
+from frf_ipz.late_imports import import_late
 from frf_ipz.progress import Progress, silent
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from frf_ipz.frf import FrfSet
     from frf_ipz.identification.options import FitOptions
+else:
+    pd = import_late("pandas")
 
 FIXED_POLES = 3  # beside the band, while modes are searched
 NOISE_ROUNDS = 3  # of fitting the start poles and estimating the noise in turn

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import optimize, special
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NoModesError
@@ -221,7 +221,7 @@ def _partners(poles: ComplexArray, half_poles: ComplexArray) -> IntArray:
 
 
 def _scatter(squares: FloatArray) -> float:
-    if not squares.size or np.sum(squares) < stats.chi2.isf(CHANCE, squares.size):
+    if not squares.size or np.sum(squares) < special.chdtri(squares.size, CHANCE):
         return 1.0
     return float(np.sqrt(np.mean(squares)))
 

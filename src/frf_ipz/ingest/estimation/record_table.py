@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import pandas as pd
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import pandas as pd
+
     from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
+else:
+    pd = import_late("pandas")
 
 COLUMNS = (
     "record",

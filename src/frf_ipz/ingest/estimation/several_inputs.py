@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfLabel, FrfSet
@@ -24,14 +23,19 @@ from frf_ipz.ingest.frf_estimate import FrfEstimate
 from frf_ipz.ingest.recording_files import UNIFORM, RecordingFiles
 from frf_ipz.ingest.signals.transients import transform_subrecords
 from frf_ipz.ingest.signals.windows import count_independent_segments, cut_segments
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    import pandas as pd
 
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.ingest.campaign import TestSetup, VibrationTest
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.progress import Progress
+else:
+    pd = import_late("pandas")
 
 SEGMENTS_OF_INPUT = 10  # independent ones: the noise is then known to a fifth, and the spectral matrix well
 SHORTEST_SEGMENT = 32  # samples

@@ -8,11 +8,18 @@ median of neighbouring lines is the noise, since modes are narrow peaks.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, median_filter
 
 from frf_ipz.arrays import BoolArray, FloatArray
+from frf_ipz.late_imports import import_late
+
+if TYPE_CHECKING:
+    from scipy.ndimage import maximum_filter1d, median_filter
+else:
+    maximum_filter1d = import_late("scipy.ndimage", "maximum_filter1d")
+    median_filter = import_late("scipy.ndimage", "median_filter")
 
 FEWEST_LINES = 32
 NEIGHBOURS = 51  # lines whose median is the noise

@@ -13,11 +13,19 @@ Vibration 11, 1977, 8-21.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d, minimum_filter1d
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
+from frf_ipz.late_imports import import_late
+
+if TYPE_CHECKING:
+    from scipy.ndimage import gaussian_filter1d, maximum_filter1d, minimum_filter1d
+else:
+    gaussian_filter1d = import_late("scipy.ndimage", "gaussian_filter1d")
+    maximum_filter1d = import_late("scipy.ndimage", "maximum_filter1d")
+    minimum_filter1d = import_late("scipy.ndimage", "minimum_filter1d")
 
 HALF, NINE_TENTHS = 0.6745, 1.6449  # of normal noise lies within so many standard deviations
 NARROWEST = 1.5  # samples of smoothing: below this a filter's ringing comes through

@@ -9,18 +9,21 @@ from typing import TYPE_CHECKING
 from frf_ipz.export import run_tables as tables
 from frf_ipz.export.parquet import write_table
 from frf_ipz.frf import FrfSet
-from frf_ipz.identification.fit import fit_modes
 from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.late_imports import import_late
 from frf_ipz.pipeline.stages.mismatch import corrections
 from frf_ipz.rational import without_window
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Diagnosis
+    from frf_ipz.identification.fit import fit_modes
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.modes import ModalParameters
     from frf_ipz.pipeline.stage_runner import StageRunner
     from frf_ipz.runs.folder import Writers
+else:
+    fit_modes = import_late("frf_ipz.identification.fit", "fit_modes")
 
 
 def ingest(runner: StageRunner) -> FrfEstimate:

@@ -7,15 +7,12 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from frf_ipz.diagnosis.apply import correct_frfs, correct_model
 from frf_ipz.diagnosis.deadline import Deadline
-from frf_ipz.diagnosis.diagnose import find_causes
 from frf_ipz.diagnosis.effect_selection import EffectCatalogue
-from frf_ipz.diagnosis.measured.levels import compare_frf_levels, compare_levels
-from frf_ipz.diagnosis.observations import observe
 from frf_ipz.frf import FrfSet
 from frf_ipz.ingest.estimation.frf_files import read_frf_levels
 from frf_ipz.input_files import entering
+from frf_ipz.late_imports import import_late
 from frf_ipz.output_files import write_text
 
 if TYPE_CHECKING:
@@ -30,6 +27,17 @@ if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel
 
     _Run: TypeAlias = Literal["auto", "always"]
+    from frf_ipz.diagnosis.apply import correct_frfs, correct_model
+    from frf_ipz.diagnosis.diagnose import find_causes
+    from frf_ipz.diagnosis.measured.levels import compare_frf_levels, compare_levels
+    from frf_ipz.diagnosis.observations import observe
+else:
+    correct_frfs = import_late("frf_ipz.diagnosis.apply", "correct_frfs")
+    correct_model = import_late("frf_ipz.diagnosis.apply", "correct_model")
+    find_causes = import_late("frf_ipz.diagnosis.diagnose", "find_causes")
+    compare_frf_levels = import_late("frf_ipz.diagnosis.measured.levels", "compare_frf_levels")
+    compare_levels = import_late("frf_ipz.diagnosis.measured.levels", "compare_levels")
+    observe = import_late("frf_ipz.diagnosis.observations", "observe")
 
 STAGES = ("diagnose", "levels")
 RUN_SECONDS = 60.0  # wall time of a search in a run, where the user states none

@@ -8,18 +8,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
+from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.pencils import Roots, damped_sensitivity
 from frf_ipz.updating.ipz.step import ILL_CONDITIONED
 from frf_ipz.updating.tracking import TargetRoots
 from frf_ipz.updating.updated_model import UpdateStatus
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from frf_ipz.updating.parameters import ParameterBasis
     from frf_ipz.updating.problem import UpdateProblem
+else:
+    pd = import_late("pandas")
 
 INSENSITIVE = 1e-12  # of the largest sensitivity: a parameter below moves no target
 

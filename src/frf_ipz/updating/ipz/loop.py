@@ -9,15 +9,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.errors import NumericalError
+from frf_ipz.late_imports import import_late
 from frf_ipz.updating.ipz.step import PublishedStep
 from frf_ipz.updating.updated_model import UpdateStatus
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from frf_ipz.progress import Progress
+else:
+    pd = import_late("pandas")
 
 MAX_ROWS = 32_768  # of the history: beyond, every second one is dropped, as often as needed
 GROWTH = 1e4  # times the first misfit from which an iteration has diverged; it may rise at first

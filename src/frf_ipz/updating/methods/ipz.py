@@ -15,21 +15,25 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import InputError
+from frf_ipz.late_imports import import_late
 from frf_ipz.updating.ipz.chosen_parameters import iterate_parameters
 from frf_ipz.updating.ipz.loop import LoopResult, published_loop
 from frf_ipz.updating.ipz.step import PublishedStep, StepSettings
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, nothing_to_do
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from frf_ipz.progress import Progress
     from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.options import UpdateOptions
     from frf_ipz.updating.parameters import ParameterBasis
     from frf_ipz.updating.problem import UpdateProblem
+else:
+    pd = import_late("pandas")
 
 MAX_ITERATIONS = 50_000
 

@@ -13,9 +13,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.low_rank import factorise
 from frf_ipz.updating.along_structure import part_table
 from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
@@ -30,9 +30,13 @@ from frf_ipz.updating.tracking import TargetRoots, TrackedRoots
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, nothing_to_do
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from frf_ipz.progress import Progress
     from frf_ipz.updating.options import UpdateOptions
     from frf_ipz.updating.problem import UpdateProblem
+else:
+    pd = import_late("pandas")
 
 SMALLEST_NOISE = 1e-6  # relative standard deviation of a frequency: none is measured better
 EXCLUDED_STD = 1.0  # relative standard deviation of an excluded target

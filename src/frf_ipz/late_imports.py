@@ -1,0 +1,54 @@
+"""What is imported when it is used, so that a command starts without what it may not need.
+
+An import inside a function would say the same again at each place where the module is used. This stands where imports
+stand, under the ``else`` of the ``TYPE_CHECKING`` under which type checkers see the import itself.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+
+class _LateModule:
+    """Stands for a module."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __getattr__(self, attribute: str) -> Any:  # noqa: ANN401 - anything that a module may hold
+        return getattr(import_module(self._name), attribute)
+
+
+class _LateFunction:
+    """Stands for a function of a module."""
+
+    def __init__(self, module: str, name: str) -> None:
+        self._module, self._name = module, name
+
+    def __call__(self, *args: Any, **options: Any) -> Any:  # noqa: ANN401 - those of the function
+        return getattr(import_module(self._module), self._name)(*args, **options)
+
+
+def import_late(module: str, function: str = "") -> Any:  # noqa: ANN401 - a module or a function
+    """Import a module when something of it is used, or a function when it is called.
+
+    Parameters
+    ----------
+    module : str
+        Its full name.
+    function : str
+        Name of a function in it.
+
+    Returns
+    -------
+    object
+        Has the attributes of the module, or is called as the function is.
+
+    Examples
+    --------
+    >>> fractions, sqrt = import_late("fractions"), import_late("math", "sqrt")
+    >>> fractions.Fraction(1, 2), sqrt(4)
+    (Fraction(1, 2), 2.0)
+    """
+    return _LateFunction(module, function) if function else _LateModule(module)
