@@ -91,7 +91,9 @@ def unconfirmed_reasons(halves: SplitHalf | None, modes: IntArray) -> tuple[str,
 
 
 def without_unconfirmed(fitted: FittedModes, halves: SplitHalf, options: FitOptions) -> tuple[FittedModes, SplitHalf]:
-    """Drop the modes that neither half has, and that are weak or share the peak of a mode that both have.
+    """Drop the modes that neither half has, though it would see them, or that are weak or under another's peak.
+
+    A mode that is wider than the spacing of a half's lines would stand in each half as it stands in all.
 
     Parameters
     ----------
@@ -112,7 +114,8 @@ def without_unconfirmed(fitted: FittedModes, halves: SplitHalf, options: FitOpti
     inside = (hertz >= fitted.lines.band_hz[0]) & (hertz <= fitted.lines.band_hz[1])
     apart = np.abs(poles[:, None] - poles) / -(poles.real[:, None] + poles.real)
     shares_peak = ((apart < 1) & (halves.n_halves == HALVES) & (significance > significance[:, None])).any(axis=1)
-    dropped = inside & (halves.n_halves == 0) & (shares_peak | (significance < DEMANDED))
+    is_resolved = -poles.real / np.pi > HALVES * fitted.lines.line_hz
+    dropped = inside & (halves.n_halves == 0) & (shares_peak | is_resolved | (significance < DEMANDED))
     for pin in options.pinned:
         dropped[np.argmin(np.abs(hertz - pin.hz))] = False
     if not dropped.any():
@@ -126,7 +129,7 @@ def without_unconfirmed(fitted: FittedModes, halves: SplitHalf, options: FitOpti
             "damping_ratio": float(damping_ratio(poles[[number]])[0]),
             "action": "dropped",
             "reason": "comes up in neither half of the lines (even, odd), when each is fitted by itself, and "
-            + ("shares the peak of a mode that does" if shares_peak[number] else "hardly stands out")
+            + _why_dropped(shares_peak=shares_peak[number], is_resolved=is_resolved[number])
             + f"; [fit] pin_hz = [{hertz[number]:.6g}] calls it back",
         }
         for number in np.flatnonzero(dropped).tolist()
@@ -142,6 +145,12 @@ def without_unconfirmed(fitted: FittedModes, halves: SplitHalf, options: FitOpti
             shift=halves.shift[parts],
         ),
     )
+
+
+def _why_dropped(*, shares_peak: bool, is_resolved: bool) -> str:
+    if shares_peak:
+        return "shares the peak of a mode that does"
+    return "is wide enough to stand in each" if is_resolved else "hardly stands out"
 
 
 def fit_halves(frfs: FrfSet, fitted: FittedModes, options: FitOptions) -> SplitHalf | None:
