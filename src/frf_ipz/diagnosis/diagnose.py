@@ -246,7 +246,7 @@ def _diagnose(
     progress(0.2, "fitting the nominal model")
     nothing = decide_without_search(problem)
     is_searched = bool(problem.effects) and not is_clearly_nonlinear
-    is_searched &= not (only_where_they_differ and nothing.verdict is DiagnosisVerdict.CONSISTENT)
+    is_searched &= not (only_where_they_differ and nothing.verdict == DiagnosisVerdict.CONSISTENT)
     found = _Found(problem=problem, decision=nothing, shortfall=_shortfall(nothing))
     if is_searched:
         found = _search(problem, nothing, pose_with, options, deadline, progress)
@@ -279,7 +279,7 @@ def _diagnose(
             statement=f"Weak and strong records disagree. Stopped before all was tried: {NO_TIME_FOR_LAWS}.",
             unexplained_part=DISAGREEING,
         )
-    if is_clearly_nonlinear or not effects or decision.verdict is DiagnosisVerdict.UNEXPLAINED:
+    if is_clearly_nonlinear or not effects or decision.verdict == DiagnosisVerdict.UNEXPLAINED:
         pose_with_observations = partial(_pose_with_observations, model, options, effects, scale)
         limited = replace(problem, deadline=deadline)
         try:
@@ -356,7 +356,7 @@ def _refuse_implausible(limited: InferenceProblem, decision: Decision) -> _Found
     if unnamed_force is not None:
         decision = replace(decision, verdict=DiagnosisVerdict.UNEXPLAINED, unnamed_force=unnamed_force)
         return _Found(problem=problem, decision=decision, shortfall=describe_unnamed_force(unnamed_force))
-    if decision.verdict is DiagnosisVerdict.EXPLAINED and (reason := describe_implausibility(decision.final)):
+    if decision.verdict == DiagnosisVerdict.EXPLAINED and (reason := describe_implausibility(decision.final)):
         return _Found(
             problem=problem, decision=replace(decision, verdict=DiagnosisVerdict.UNEXPLAINED), shortfall=reason
         )
@@ -364,13 +364,13 @@ def _refuse_implausible(limited: InferenceProblem, decision: Decision) -> _Found
 
 
 def _shortfall(decision: Decision) -> str:
-    return decision.goodness.shortfall if decision.verdict is DiagnosisVerdict.UNEXPLAINED else ""
+    return decision.goodness.shortfall if decision.verdict == DiagnosisVerdict.UNEXPLAINED else ""
 
 
 def _prove_and_prune(problem: InferenceProblem, held_out: Data, decision: Decision) -> tuple[Decision, Proof]:
     """Prove, and drop what explains a part only and makes worse what was not fitted."""
     proof = prove(problem, held_out, decision.null, decision.final)
-    while decision.verdict is DiagnosisVerdict.UNEXPLAINED and proof.after.held_out > proof.before.held_out:
+    while decision.verdict == DiagnosisVerdict.UNEXPLAINED and proof.after.held_out > proof.before.held_out:
         if decision.final is decision.null:  # the nominal model goes on
             nominal_curves = replace(proof.curves, explained=proof.curves.nominal)
             return decision, replace(proof, after=proof.before, curves=nominal_curves)
@@ -458,7 +458,7 @@ def _diagnose_nonlinear(
 ) -> Diagnosis:
     """Search for a linear effect beside a law, where that has a large nuisance chi2 or none explains by itself."""
     beside = None
-    if problem.effects and laws.verdict is DiagnosisVerdict.UNEXPLAINED:
+    if problem.effects and laws.verdict == DiagnosisVerdict.UNEXPLAINED:
         beside = search_beside_linear(problem, decision, laws, model, observations, laws_of)
     if problem.effects and beside is None:
         beside = search_beside_law(pose_with_observations, laws, model, observations, laws_of)
@@ -469,7 +469,7 @@ def _diagnose_nonlinear(
         findings = tuple(sorted((*diagnosis.findings, component), key=lambda finding: -finding.log_evidence_gain))
         return replace(diagnosis, findings=findings, statement=f"{diagnosis.statement} {component.statement}")
     diagnosis = _add_law(linear, laws)
-    if laws.verdict is not DiagnosisVerdict.UNEXPLAINED or diagnosis.findings or not linear.findings:
+    if laws.verdict != DiagnosisVerdict.UNEXPLAINED or diagnosis.findings or not linear.findings:
         return diagnosis
     appearing = linear.findings if linear.unexplained_part else _appearing(linear.findings)
     return replace(
@@ -483,7 +483,7 @@ def _diagnose_nonlinear(
 
 def _prefer_proven_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     """Keep a linear explanation that leaves nothing, unless a law explains how records disagree: nothing linear can."""
-    is_proven = laws.verdict is DiagnosisVerdict.EXPLAINED and laws.nonlinear_evidence > LAW_NATS
+    is_proven = laws.verdict == DiagnosisVerdict.EXPLAINED and laws.nonlinear_evidence > LAW_NATS
     return _add_law(linear, laws) if is_proven else linear
 
 
@@ -492,14 +492,14 @@ def _add_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     findings = tuple(finding for finding in laws.findings if finding.log_evidence_gain > LAW_NATS)
     before, updated, after = laws.before or linear.before, laws.updated or linear.updated, laws.after or linear.updated
     is_needed = bool(findings) and float(np.fmin(findings[0].log_evidence_gain, laws.nonlinear_evidence)) > LAW_NATS
-    is_worse = laws.verdict is DiagnosisVerdict.UNEXPLAINED and after.held_out > updated.held_out
+    is_worse = laws.verdict == DiagnosisVerdict.UNEXPLAINED and after.held_out > updated.held_out
     n_findings = 1 if is_needed and not is_worse else 0
     linearised = linearise(laws.fit, laws.modal_model) if n_findings and laws.fit and laws.modal_model else None
     return replace(
         linear,
         verdict=laws.verdict,
         findings=findings[:n_findings]
-        if laws.verdict is DiagnosisVerdict.EXPLAINED
+        if laws.verdict == DiagnosisVerdict.EXPLAINED
         else _appearing(findings[:n_findings]),
         alternatives=findings[n_findings:],
         before=before,
@@ -510,7 +510,7 @@ def _add_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
         statement=laws.statement if linearised is None else f"{laws.statement} {linearised.statement}",
         linearised_law=linearised,
         law_in_time=None if linearised is None else laws.law_in_time,
-        unexplained_part=DISAGREEING if laws.verdict is DiagnosisVerdict.UNEXPLAINED else "",
+        unexplained_part=DISAGREEING if laws.verdict == DiagnosisVerdict.UNEXPLAINED else "",
     )
 
 
@@ -520,7 +520,7 @@ def _locate_mismatch(
     """Locate what was found, or what remains unexplained."""
     if decision.unnamed_force is not None:
         return decision.unnamed_force.hypothesis.components[-1].location.entries
-    if decision.verdict is DiagnosisVerdict.UNEXPLAINED:
+    if decision.verdict == DiagnosisVerdict.UNEXPLAINED:
         return localise_mismatch(problem, decision.null)
     return findings[0].location if findings else {}
 
@@ -539,7 +539,7 @@ def _make_findings(
         return ()
     if not decision.further_rankings:
         only = make_finding(ranked_effects[0], log_bayes_factor(decision.final, decision.null), scale)
-        is_needed = decision.verdict is DiagnosisVerdict.EXPLAINED  # nothing explains without it
+        is_needed = decision.verdict == DiagnosisVerdict.EXPLAINED  # nothing explains without it
         return (replace(only, is_significant=only.is_significant or is_needed),)
     competing = rank_effects(decision.further_rankings[-1].fits, scale)
     newest = make_finding(competing[0], log_bayes_factor(decision.final, decision.further_rankings[-1].base), scale)
@@ -610,7 +610,7 @@ def _appearing(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
 
 def _judge(diagnosis: Diagnosis, decision: Decision, found: str, *, is_searched: bool) -> str:
     """Say what the verdict means: a part that is found where something remains unexplained is no fact."""
-    if diagnosis.verdict is DiagnosisVerdict.CONSISTENT:
+    if diagnosis.verdict == DiagnosisVerdict.CONSISTENT:
         reason = (
             "the nominal model explains the measurement within noise and its tolerances (it leaves "
             f"{np.sqrt(decision.null_goodness.misfit):.2g} times the expected misfit)"
@@ -618,7 +618,7 @@ def _judge(diagnosis: Diagnosis, decision: Decision, found: str, *, is_searched:
         if is_searched:
             return f"Nothing is missing: {reason}."
         return f"Nothing missing was seen: {reason}; so no cause was searched for."
-    if diagnosis.verdict is DiagnosisVerdict.EXPLAINED:
+    if diagnosis.verdict == DiagnosisVerdict.EXPLAINED:
         return f"{found} With that, the model explains the measurement."
     if not diagnosis.unexplained_part:  # all but damping, which is as measured
         if found:

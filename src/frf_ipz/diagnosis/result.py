@@ -676,7 +676,7 @@ class Diagnosis(Tabulated, Drawn):
     def is_explained(self) -> bool:
         """True where nothing remains that the findings and the measured damping do not explain."""
         is_damping_only = bool(self.statements) and not self.unexplained_part
-        return self.verdict is not DiagnosisVerdict.UNEXPLAINED or is_damping_only
+        return self.verdict != DiagnosisVerdict.UNEXPLAINED or is_damping_only
 
     def __repr__(self) -> str:
         effects = ", ".join(finding.effect for finding in self.findings) or "no finding"

@@ -74,7 +74,7 @@ class Comparison(Concise):
     @property
     def is_changed(self) -> bool:
         """True where more differs than from test to test."""
-        return self.diagnosis.verdict is not DiagnosisVerdict.CONSISTENT
+        return self.diagnosis.verdict != DiagnosisVerdict.CONSISTENT
 
     @property
     def changes(self) -> tuple[Finding, ...]:

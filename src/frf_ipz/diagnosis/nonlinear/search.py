@@ -137,7 +137,7 @@ class LawSearch:
     @property
     def is_nonlinear(self) -> bool:
         """No linear system explains the records."""
-        return self.verdict is not DiagnosisVerdict.CONSISTENT
+        return self.verdict != DiagnosisVerdict.CONSISTENT
 
     @property
     def nuisance_chi2(self) -> float:
@@ -209,12 +209,12 @@ def search_laws(
     )
     state = _search_catalogue(data, linearity, laws)
     if state.result.fit is not None and (
-        state.result.verdict is DiagnosisVerdict.UNEXPLAINED or not is_explained(state.result.fit)
+        state.result.verdict == DiagnosisVerdict.UNEXPLAINED or not is_explained(state.result.fit)
     ):
         progress(0.4, "checking for a dispersion of the converters")
         state = _search_without_dispersion(state, linearity, laws)
     result = state.result
-    if result.verdict is DiagnosisVerdict.UNEXPLAINED:
+    if result.verdict == DiagnosisVerdict.UNEXPLAINED:
         progress(0.6, "locating a force of unknown law")
         located = _locate_unknown_force(state)
         part = LARGELY if _free_force_explains(state.long, located.location) else MOSTLY
@@ -261,7 +261,7 @@ def _search_catalogue(data: LawFitData, linearity: Linearity, laws: Sequence[Law
     first_moments = chain([short], (make_problem(duration, FINE) for duration in later))
     if (
         result.fit is not None
-        and result.verdict is DiagnosisVerdict.UNEXPLAINED
+        and result.verdict == DiagnosisVerdict.UNEXPLAINED
         and _explains_first_moments(first_moments, result.fit)
     ):
         early = "It explains their first moments; its later misfit grows from small errors of the model."

@@ -114,7 +114,7 @@ def _decide_in_steps(problem: InferenceProblem, nothing: Decision, progress: Pro
         ranking = rescore_ambiguity_set(problem, fit_distant_locations(problem, ranking))
     first = _judge_first(problem, nothing, ranking, required)
     yield replace(first, not_searched=SECOND)
-    if first.verdict is DiagnosisVerdict.CONSISTENT:
+    if first.verdict == DiagnosisVerdict.CONSISTENT:
         return
     progress(0.6, "searching for a second effect")
     if first.goodness.is_good:
@@ -131,7 +131,7 @@ def _decide_in_steps(problem: InferenceProblem, nothing: Decision, progress: Pro
     yield replace(single or pair_decision, not_searched=THIRD)
     if (
         single is not None
-        or pair_decision.verdict is DiagnosisVerdict.EXPLAINED
+        or pair_decision.verdict == DiagnosisVerdict.EXPLAINED
         or not pair_decision.final.is_nearly_right
         or log_bayes_factor(second.best, second.base) < STRONG_LOG_BAYES_FACTOR
     ):
@@ -140,7 +140,7 @@ def _decide_in_steps(problem: InferenceProblem, nothing: Decision, progress: Pro
     third = _accept_further(
         problem, pair_decision, search_small_component(problem, second.best, STRONG_LOG_BAYES_FACTOR)
     )
-    if third is not None and third.verdict is DiagnosisVerdict.EXPLAINED:
+    if third is not None and third.verdict == DiagnosisVerdict.EXPLAINED:
         yield third
 
 

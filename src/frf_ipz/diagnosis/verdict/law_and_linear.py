@@ -82,7 +82,7 @@ def search_beside_linear(
     change = best.hypothesis.change(best.values)
     laws = search_laws(with_change(model, change), undo_chain_effects(observations, change))
     is_reduced = laws.fit is not None and laws.nuisance_chi2 < MAX_NUISANCE_CHI2 and _reduces_nuisance(laws, alone)
-    if sum((is_most, laws.verdict is DiagnosisVerdict.EXPLAINED, is_reduced)) < 2:
+    if sum((is_most, laws.verdict == DiagnosisVerdict.EXPLAINED, is_reduced)) < 2:
         return None
     scale = max(1.0, best.mean_misfit)
     return laws, make_finding(rank_effects(ranking.fits, scale)[0], log_bayes_factor(best, null), scale)
@@ -120,7 +120,7 @@ def search_beside_law(
     remaining = _remove_law(observations, laws)
     if remaining is None:
         return None
-    explains, problem = laws.verdict is DiagnosisVerdict.EXPLAINED, pose_with_observations(remaining)
+    explains, problem = laws.verdict == DiagnosisVerdict.EXPLAINED, pose_with_observations(remaining)
     null = fit_null_model(problem)
     ranking = search_component(problem, null)
     best = ranking.best
@@ -136,7 +136,7 @@ def search_beside_law(
     change = best.hypothesis.change(best.values)
     laws_beside = search_laws(with_change(model, change), undo_chain_effects(observations, change))
     if (
-        laws_beside.verdict is not DiagnosisVerdict.EXPLAINED
+        laws_beside.verdict != DiagnosisVerdict.EXPLAINED
         or not _reduces_nuisance(laws_beside, laws)
         or not (explains or laws_beside.nuisance_chi2 < MAX_NUISANCE_CHI2)
     ):
@@ -156,9 +156,7 @@ def _remove_law(observations: Observations, laws: LawSearch) -> Observations | N
         or len(laws.nuisance_prior.moving)
     ):
         return None
-    if laws.verdict is not DiagnosisVerdict.EXPLAINED and (
-        laws.after is None or laws.after.training_noise > MAX_MISFIT
-    ):
+    if laws.verdict != DiagnosisVerdict.EXPLAINED and (laws.after is None or laws.after.training_noise > MAX_MISFIT):
         return None
     with np.errstate(all="ignore"):  # it was fitted to the first moments, and may run away later
         linear = subtract_law(remove_dispersion(observations, laws.dispersion_rad), laws.nuisance_prior, laws.fit)

@@ -56,7 +56,7 @@ def is_damping_only(problem: InferenceProblem, decision: Decision) -> bool:
     bool
         True where a search with free damping is worthwhile.
     """
-    if decision.verdict is not DiagnosisVerdict.UNEXPLAINED:
+    if decision.verdict != DiagnosisVerdict.UNEXPLAINED:
         return False
     fits = (decision.final,) if decision.final.explains_nearly_all else (decision.final, decision.null)
     return any(is_damping_dominant(problem, fit) for fit in fits)

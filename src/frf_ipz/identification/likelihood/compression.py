@@ -370,7 +370,10 @@ def solve_upper(U: FloatArray, z: FloatArray) -> FloatArray:
 
 def _factorise(gram: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """Triangular factor of normal equations and their right-hand sides; None where too many digits are lost."""
-    length = np.sqrt(np.diagonal(gram))
+    squares = np.diagonal(gram)
+    if not np.all(squares > 0):
+        return None
+    length = np.sqrt(squares)
     try:
         U = linalg.cholesky(gram / length / length[:, None], check_finite=False)
     except linalg.LinAlgError:

@@ -14,7 +14,13 @@ import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NoModesError
-from frf_ipz.identification.likelihood.compression import column_gains, compress, response
+from frf_ipz.identification.likelihood.compression import (
+    CompressedSystem,
+    column_gains,
+    compress,
+    response,
+    solve_upper,
+)
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
 from frf_ipz.identification.likelihood.sandwich import pole_variance_factors
 from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms, smooth_terms_of_band
@@ -212,11 +218,11 @@ def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progres
 
     def fit_lines(lines: MeasuredLines, delay_s: FloatArray) -> FittedModes:
         selected = _select(lines, start.poles, terms, options, noise_is_known=noise_is_known)
-        demanded = _demanded_terms(selected.data, selected.fit.poles, all_terms)
-        if demanded.n_columns > terms.n_columns:  # some poles may have stood for them
-            selected = _select(lines, selected.fit.poles, demanded, options, noise_is_known=noise_is_known)
+        chosen = _needed_terms(selected.data, selected.fit.poles, all_terms)
+        if chosen.n_columns > terms.n_columns:  # some poles may have stood for them
+            selected = _select(lines, selected.fit.poles, chosen, options, noise_is_known=noise_is_known)
         progress(0.5, "refining")
-        return _refine_with_final_weights(lines, selected, demanded, start=start.table, delay_s=delay_s)
+        return _refine_with_final_weights(lines, selected, chosen, start=start.table, delay_s=delay_s)
 
     def find_poles(lines: MeasuredLines) -> ComplexArray:
         complex_modes = replace(options, modes="complex")
@@ -239,18 +245,36 @@ def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progres
     return fitted
 
 
-def _demanded_terms(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) -> SmoothTerms:
-    """Take fixed poles beyond the first where the BIC of any FRF demands them: their lack would bend its residues."""
+def _needed_terms(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) -> SmoothTerms:
+    """Take fixed poles beyond the first where the BIC of any FRF demands them and their lack bends residues.
+
+    It bends them where one moves by more than the largest of as many errors. Else the numbers that fixed poles cost are
+    better spent on zeros.
+    """
     n_lines, n_frfs = data.receptance.shape
     system = compress(data, poles, terms)
-    if 2 * n_lines <= system.n_linear:
-        return terms.first(FIXED_POLES)
-    level = np.maximum(system.misfit / (2 * n_lines - system.n_linear), 1.0)
+    few = terms.first(FIXED_POLES)
+    n_spare = 2 * n_lines - system.n_linear
+    if n_spare <= 0:
+        return few
+    level = np.maximum(system.misfit / n_spare, 1.0)
     fewer = range(FIXED_POLES, len(terms.poles))
     columns = [list(range(terms.first(n_fixed).n_columns, terms.n_columns)) for n_fixed in fewer]
     demanded = np.array([len(group) * log(2 * n_lines) + 2 * log(n_frfs) for group in columns])
     is_too_few = (column_gains(system, columns) / level > demanded[:, None]).any(axis=1)
-    return terms.first(int(np.max(np.array(fewer)[is_too_few], initial=FIXED_POLES - 1)) + 1)
+    if not is_too_few.any():
+        return few
+    many = terms.first(int(np.max(np.array(fewer)[is_too_few])) + 1)
+    residues, std = _residues(compress(data, poles, many), many)
+    moved = (residues - _residues(compress(data, poles, few), few)[0]) / (std * np.sqrt(level)[:, None])
+    return many if np.abs(moved).max() > np.sqrt(2 * log(max(moved.size, 2))) else few
+
+
+def _residues(system: CompressedSystem, terms: SmoothTerms) -> tuple[FloatArray, FloatArray]:
+    """Real numbers of the residues, (n_frfs, n_numbers), and their standard deviations at noise as stated."""
+    inverses = np.linalg.inv(system.U)
+    std = np.sqrt(np.einsum("kij,kij->ki", inverses, inverses))
+    return solve_upper(system.U, system.z)[:, terms.n_columns :], std[:, terms.n_columns :]
 
 
 def _with_noise_beside_peaks(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms) -> MeasuredLines:
