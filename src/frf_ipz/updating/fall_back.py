@@ -2,7 +2,8 @@
 
 An update moves poles and zeros to those that were measured. Where some are paired wrongly (many light local modes in
 few sensors), the FRFs in between move away from the measurement. So the median deviation of the measured FRFs, in dB,
-is compared before and after; the noise of the fitted FRFs is what it may grow by without meaning anything.
+is compared before and after; the noise of the fitted FRFs is what it may grow by without meaning anything. A factor that
+all FRFs share is taken off: a level that is wrong, of units or of the mass, is no work of the update.
 """
 
 from __future__ import annotations
@@ -52,7 +53,8 @@ def keep_if_better(updated: UpdatedModel, fit: ModalFit) -> UpdatedModel:
 
     def deviation_db(*, nominal: bool) -> float:
         values = np.abs(updated.compute_frfs(fit.labels, s, nominal=nominal))[is_heard]
-        return float(np.median(np.abs(DB * np.log(np.maximum(values, np.finfo(float).tiny) / measured[is_heard]))))
+        off_db = DB * np.log(np.maximum(values, np.finfo(float).tiny) / measured[is_heard])
+        return float(np.median(np.abs(off_db - np.median(off_db))))
 
     before_db, after_db = deviation_db(nominal=True), deviation_db(nominal=False)
     noise_db = float(np.median(DB * fit.value_std[is_heard] / measured[is_heard]))
