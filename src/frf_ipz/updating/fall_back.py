@@ -2,8 +2,8 @@
 
 An update moves poles and zeros to those that were measured. Where some are paired wrongly (many light local modes in
 few sensors), the FRFs in between move away from the measurement. So the median deviation of the measured FRFs, in dB,
-is compared before and after; the noise of the fitted FRFs is what it may grow by without meaning anything. A factor that
-all FRFs share is taken off: a level that is wrong, of units or of the mass, is no work of the update.
+is compared before and after; the noise of the fitted FRFs is what it may grow by without meaning anything. A factor
+that all FRFs share is taken off: a level that is wrong, of units or of the mass, is no work of the update.
 """
 
 from __future__ import annotations
