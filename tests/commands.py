@@ -25,6 +25,18 @@ LOADED = (
     "frf_ipz.cli.terminal",
     "frf_ipz.cli.pictures",
     "frf_ipz.cli.local_page",
+    "frf_ipz.diagnosis.apply",  # from here on what the package imports when it is used
+    "frf_ipz.diagnosis.diagnose",
+    "frf_ipz.identification.fit",
+    "frf_ipz.pipeline.stages.causes",
+    "frf_ipz.pipeline.stages.hints",
+    "frf_ipz.pipeline.stages.modelling",
+    "frf_ipz.pipeline.stages.outputs",
+    "pandas",
+    "pyarrow.compute",
+    "pyarrow.parquet",
+    "scipy.ndimage",
+    "scipy.optimize",
     "small_results",
 )
 PAUSE_S = 0.01

@@ -89,7 +89,7 @@ def test_an_effect_that_relieves_a_strained_model_is_named_beside_a_law_that_doe
 
 
 def test_records_that_agree_beside_a_linear_effect_are_no_law(nominal):
-    laws = Laws("linear")
+    laws = Laws("consistent")
     laws.law.fit = None
     assert (
         beside(nominal, measured(with_point_masses(nominal, {12: MASS_KG})), ("added_mass",), laws, alone=50.0) is None
