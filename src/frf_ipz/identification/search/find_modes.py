@@ -6,6 +6,7 @@ support them.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import log
 from typing import TYPE_CHECKING
@@ -241,7 +242,8 @@ def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progres
             return _fit_advanced(frfs, delay, options)
     if np.median(fitted.misfit_ratio) > MODEL_ERROR:
         progress(0.55, "adding and dropping poles by the model error")
-        fitted = _against_model_error(fitted, options)
+        with suppress(NoModesError):  # where the model error hides them all, those of the noise alone are what there is
+            fitted = _against_model_error(fitted, options)
     return fitted
 
 

@@ -93,7 +93,8 @@ def unconfirmed_reasons(halves: SplitHalf | None, modes: IntArray) -> tuple[str,
 def without_unconfirmed(fitted: FittedModes, halves: SplitHalf, options: FitOptions) -> tuple[FittedModes, SplitHalf]:
     """Drop the modes that neither half has, though it would see them, or that are weak or under another's peak.
 
-    A mode that is wider than the spacing of a half's lines would stand in each half as it stands in all.
+    A mode that is wider than the spacing of a half's lines would stand in each half as it stands in all, where the
+    errors of lines are their own; those of one impact are common to the lines of a peak.
 
     Parameters
     ----------
@@ -114,11 +115,12 @@ def without_unconfirmed(fitted: FittedModes, halves: SplitHalf, options: FitOpti
     inside = (hertz >= fitted.lines.band_hz[0]) & (hertz <= fitted.lines.band_hz[1])
     apart = np.abs(poles[:, None] - poles) / -(poles.real[:, None] + poles.real)
     shares_peak = ((apart < 1) & (halves.n_halves == HALVES) & (significance > significance[:, None])).any(axis=1)
-    is_resolved = -poles.real / np.pi > HALVES * fitted.lines.line_hz
+    has_own_errors = fitted.noise_from == "misfit"
+    is_resolved = has_own_errors & (-poles.real / np.pi > HALVES * fitted.lines.line_hz)
     dropped = inside & (halves.n_halves == 0) & (shares_peak | is_resolved | (significance < DEMANDED))
     for pin in options.pinned:
         dropped[np.argmin(np.abs(hertz - pin.hz))] = False
-    if not dropped.any():
+    if not dropped.any() or not (inside & ~dropped).any():  # no fit without a mode
         return fitted, halves
     data = replace(fitted.lines.weighted(), real_modes=fitted.fit.system.real_modes)
     fit = refine_poles(data, poles[~dropped], fitted.terms)
