@@ -221,7 +221,11 @@ def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progres
         selected = _select(lines, start.poles, terms, options, noise_is_known=noise_is_known)
         chosen = _needed_terms(selected.data, selected.fit.poles, all_terms)
         if chosen.n_columns > terms.n_columns:  # some poles may have stood for them
-            selected = _select(lines, selected.fit.poles, chosen, options, noise_is_known=noise_is_known)
+            other = _select(lines, selected.fit.poles, chosen, options, noise_is_known=noise_is_known)
+            if _shared_peaks(other.fit.poles) > _shared_peaks(selected.fit.poles):  # a drift, no lack of fixed poles
+                chosen = terms
+            else:
+                selected = other
         progress(0.5, "refining")
         return _refine_with_final_weights(lines, selected, chosen, start=start.table, delay_s=delay_s)
 
@@ -270,6 +274,12 @@ def _needed_terms(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) 
     residues, std = _residues(compress(data, poles, many), many)
     moved = (residues - _residues(compress(data, poles, few), few)[0]) / (std * np.sqrt(level)[:, None])
     return many if np.abs(moved).max() > np.sqrt(2 * log(max(moved.size, 2))) else few
+
+
+def _shared_peaks(poles: ComplexArray) -> int:
+    """Count the pairs of poles nearer to each other than the sum of their half widths."""
+    near = np.abs(poles[:, None] - poles) < -(poles.real[:, None] + poles.real)
+    return int(np.count_nonzero(np.triu(near, 1)))
 
 
 def _residues(system: CompressedSystem, terms: SmoothTerms) -> tuple[FloatArray, FloatArray]:
