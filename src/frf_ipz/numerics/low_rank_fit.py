@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 SWEEPS = 30  # over rows and columns
 
 
-def fit_products(matrix: ComplexArray, weight: FloatArray, rank: int) -> tuple[ComplexArray, ComplexArray]:
+def fit_products(matrix: ComplexArray | FloatArray, weight: FloatArray, rank: int) -> tuple[ComplexArray, ComplexArray]:
     """Find the sum of products of two vectors, ``rows @ columns.T``, that fits a matrix best.
 
     Parameters
     ----------
-    matrix : (n_rows, n_columns) complex array
+    matrix : (n_rows, n_columns) complex or real array
         What is fitted.
     weight : (n_rows, n_columns) array
         Of the square of each entry's misfit; 0 where there is no entry.
@@ -50,7 +50,7 @@ def fit_products(matrix: ComplexArray, weight: FloatArray, rank: int) -> tuple[C
     return _fit_rows(present, weight, columns), columns
 
 
-def _fit_rows(matrix: ComplexArray, weight: FloatArray, columns: ComplexArray) -> ComplexArray:
+def _fit_rows(matrix: ComplexArray | FloatArray, weight: FloatArray, columns: ComplexArray) -> ComplexArray:
     """Coefficients of each row in the columns."""
     normal = np.einsum("ij,jr,jq->irq", weight, columns.conj(), columns)
     right = np.einsum("ij,jr->ir", weight * matrix, columns.conj())

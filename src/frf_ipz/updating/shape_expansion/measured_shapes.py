@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.numerics.low_rank_fit import fit_products
 from frf_ipz.pairing.poles import measured_amplitudes
 from frf_ipz.rational import damping_ratio
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from frf_ipz.dofs import AnyDof
     from frf_ipz.identification.modal_fit import ModalFit
-
-ROUNDS = 50  # of filling in FRFs that were not measured and taking the leading product in turn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,9 +117,7 @@ def _leading_product(amplitudes: FloatArray, rows: IntArray, columns: IntArray) 
     counts, sums = np.zeros(shape), np.zeros(shape)
     np.add.at(counts, (rows, columns), 1.0)
     np.add.at(sums, (rows, columns), amplitudes)
-    is_measured = counts > 0
-    matrix = sums / np.maximum(counts, 1.0)
-    for _ in range(1 if is_measured.all() else ROUNDS):
-        left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
-        matrix = np.where(is_measured, matrix, sizes[0] * np.outer(left[:, 0], right[0]))
-    return float(sizes[0]), left[:, 0], right[0]
+    is_measured = (counts > 0).astype(float)
+    left, right = (vectors[:, 0].real for vectors in fit_products(sums / np.maximum(counts, 1.0), is_measured, 1))
+    sizes = [max(float(np.linalg.norm(vector)), np.finfo(float).tiny) for vector in (left, right)]
+    return sizes[0] * sizes[1], left / sizes[0], right / sizes[1]
