@@ -1,10 +1,6 @@
 """The updated model against every measured FRF: amplitude, phase, better than before, inside its own band.
 
-Limits are those of the controller that the model is for: a loop is designed with a gain margin of 6 dB and a phase
-margin of 45 degrees or more ([Skogestad2005], sec. 2.4.3). A model that spends half of either is no use, one that
-spends a sixth takes care.
-
-[Skogestad2005] S. Skogestad, I. Postlethwaite, Multivariable Feedback Control, 2nd ed., Wiley, 2005.
+Limits are those of the controller that the model is for, see `control_margins`.
 """
 
 from __future__ import annotations
@@ -17,13 +13,12 @@ from scipy.optimize import minimize_scalar
 
 from frf_ipz.assessment.assessment import Check, Verdict
 from frf_ipz.assessment.deviations import worst_median
+from frf_ipz.control_margins import GAIN_MARGIN_DB, HALF, PHASE_MARGIN_DEG, SIXTH
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
     from frf_ipz.assessment.evidence import Evidence
 
-GAIN_MARGIN_DB, PHASE_MARGIN_DEG = 6.0, 45.0
-HALF, SIXTH = 1 / 2, 1 / 6
 NORMAL_90 = 1.645  # standard deviations that hold 90 % of a normal distribution
 OVERSAMPLED = 4  # points of a transform between two that are independent: one of them is near its peak
 INSIDE = 0.75  # of the lines: of a 90 % band, a quarter outside is no chance

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.assessment.assessment import Check, Verdict
-from frf_ipz.assessment.checks.agreement import GAIN_MARGIN_DB, SIXTH
 from frf_ipz.assessment.deviations import worst_median
+from frf_ipz.control_margins import GAIN_MARGIN_DB, SIXTH
 from frf_ipz.pairing.pairs import PairVerdict
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.assessment.assessment import Check, Verdict
-from frf_ipz.assessment.checks.agreement import GAIN_MARGIN_DB, HALF, INSIDE, MOSTLY_OUTSIDE, SIXTH, judge
+from frf_ipz.assessment.checks.agreement import INSIDE, MOSTLY_OUTSIDE, judge
+from frf_ipz.control_margins import GAIN_MARGIN_DB, HALF, SIXTH
 from frf_ipz.prediction.reference import measured_at
 
 if TYPE_CHECKING:

@@ -11,8 +11,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
+from frf_ipz.control_margins import GAIN_MARGIN_DB, HALF, SIXTH
+from frf_ipz.late_imports import import_late
 from frf_ipz.pairing.pairs import Pair, Pairs, PairVerdict
 from frf_ipz.rational import natural_frequency_hz
 from frf_ipz.updating.expansion import ShapeExpansion
@@ -28,14 +29,16 @@ from frf_ipz.updating.shape_expansion.left_out_points import (
 from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.structure import Geometry
     from frf_ipz.updating.options import UpdateOptions
     from frf_ipz.updating.problem import UpdateProblem
     from frf_ipz.updating.updated_model import UpdatedModel
+else:
+    pd = import_late("pandas")
 
-TAKES_CARE_DB = 1.0  # a sixth of a gain margin of 6 dB, as in the assessment
-NO_USE_DB = 3.0  # half of that margin: a scale that is so far off where it is known is a mistake, which must show
 MOST_ENDS = 100  # sensors and excited DOFs
 
 
@@ -73,7 +76,7 @@ def with_expanded_shapes(
     if len(measured.outputs) + len(measured.inputs) > MOST_ENDS:
         return updated
     own = errors_at_points(fit, updated)
-    if np.median(own) <= TAKES_CARE_DB:
+    if np.median(own) <= SIXTH * GAIN_MARGIN_DB:
         return updated
     places = attachment_places(problem.model, measured, geometry)
     causes = [find_attached_masses(problem.model, measured, tried) for tried in dict.fromkeys(((), places))]
@@ -84,8 +87,8 @@ def with_expanded_shapes(
     if left_out is None or errors[best] >= np.median(own):
         return updated
     modes = expand_modes(loaded.model, measured, error=loaded.error, is_scale_known=fit.unknown_scale == "none")
-    if fit.unknown_scale == "none" and abs(20 * np.log10(modes.gain)) > NO_USE_DB:
-        return updated
+    if fit.unknown_scale == "none" and abs(20 * np.log10(modes.gain)) > HALF * GAIN_MARGIN_DB:
+        return updated  # a scale that is so far off where it is known is a mistake, which must show
     model, ensemble = build_expanded_model(
         loaded.model, modes, count=options.ensemble, calibration=left_out.calibration, seed=options.seed
     )
