@@ -32,6 +32,7 @@ from frf_ipz.identification.search.discrepancy import with_discrepancy
 from frf_ipz.identification.search.drift import Drift
 from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, assess_fit, peak_levels
 from frf_ipz.identification.search.selection import ROUGH_ITERATIONS, SelectedModes, select_modes
+from frf_ipz.identification.search.spurious_poles import half_widths_apart
 from frf_ipz.identification.stabilization import find_start_poles
 from frf_ipz.late_imports import import_late
 from frf_ipz.progress import Progress, silent
@@ -222,7 +223,10 @@ def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progres
         chosen = _needed_terms(selected.data, selected.fit.poles, all_terms)
         if chosen.n_columns > terms.n_columns:  # some poles may have stood for them
             other = _select(lines, selected.fit.poles, chosen, options, noise_is_known=noise_is_known)
-            if _shared_peaks(other.fit.poles) > _shared_peaks(selected.fit.poles):  # a drift, no lack of fixed poles
+            n_shared, n_shared_before = (
+                np.count_nonzero(np.triu(half_widths_apart(one.fit.poles) < 1, 1)) for one in (other, selected)
+            )
+            if n_shared > n_shared_before:  # a drift, no lack of fixed poles
                 chosen = terms
             else:
                 selected = other
@@ -252,10 +256,10 @@ def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progres
 
 
 def _needed_terms(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) -> SmoothTerms:
-    """Take fixed poles beyond the first where the BIC of any FRF demands them and their lack bends residues.
+    """Take fixed poles beyond the first where the BIC of any FRF demands them and their lack bends the modes.
 
-    It bends them where one moves by more than the largest of as many errors. Else the numbers that fixed poles cost are
-    better spent on zeros.
+    It bends them where a residue, or the step to a better pole, changes by more than the largest of as many errors.
+    Else the numbers that fixed poles cost are better spent on zeros.
     """
     n_lines, n_frfs = data.receptance.shape
     system = compress(data, poles, terms)
@@ -271,22 +275,16 @@ def _needed_terms(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) 
     if not is_too_few.any():
         return few
     many = terms.first(int(np.max(np.array(fewer)[is_too_few])) + 1)
-    residues, std = _residues(compress(data, poles, many), many)
-    moved = (residues - _residues(compress(data, poles, few), few)[0]) / (std * np.sqrt(level)[:, None])
+    of_modes, std = _numbers_of_modes(system if many.n_columns == terms.n_columns else compress(data, poles, many))
+    moved = (of_modes - _numbers_of_modes(compress(data, poles, few))[0]) / (std * np.sqrt(level)[:, None])
     return many if np.abs(moved).max() > np.sqrt(2 * log(max(moved.size, 2))) else few
 
 
-def _shared_peaks(poles: ComplexArray) -> int:
-    """Count the pairs of poles nearer to each other than the sum of their half widths."""
-    near = np.abs(poles[:, None] - poles) < -(poles.real[:, None] + poles.real)
-    return int(np.count_nonzero(np.triu(near, 1)))
-
-
-def _residues(system: CompressedSystem, terms: SmoothTerms) -> tuple[FloatArray, FloatArray]:
-    """Real numbers of the residues, (n_frfs, n_numbers), and their standard deviations at noise as stated."""
+def _numbers_of_modes(system: CompressedSystem) -> tuple[FloatArray, FloatArray]:
+    """Residues and changes of the poles, as all are free, (n_frfs, n), and their errors at noise as stated."""
     inverses = np.linalg.inv(system.U)
     std = np.sqrt(np.einsum("kij,kij->ki", inverses, inverses))
-    return solve_upper(system.U, system.z)[:, terms.n_columns :], std[:, terms.n_columns :]
+    return solve_upper(system.U, system.z)[:, system.n_smooth :], std[:, system.n_smooth :]
 
 
 def _with_noise_beside_peaks(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms) -> MeasuredLines:

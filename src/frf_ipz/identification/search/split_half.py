@@ -24,7 +24,7 @@ from frf_ipz.errors import NoModesError
 from frf_ipz.identification.likelihood.refinement import refine_poles
 from frf_ipz.identification.measured_lines import FEWEST_LINES
 from frf_ipz.identification.search.find_modes import FittedModes, find_modes, variance_factors
-from frf_ipz.identification.search.spurious_poles import DEMANDED
+from frf_ipz.identification.search.spurious_poles import DEMANDED, half_widths_apart
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
@@ -113,8 +113,9 @@ def without_unconfirmed(fitted: FittedModes, halves: SplitHalf, options: FitOpti
     poles, significance = fitted.fit.poles, fitted.goodness.significance
     hertz = natural_frequency_hz(poles)
     inside = (hertz >= fitted.lines.band_hz[0]) & (hertz <= fitted.lines.band_hz[1])
-    apart = np.abs(poles[:, None] - poles) / -(poles.real[:, None] + poles.real)
-    shares_peak = ((apart < 1) & (halves.n_halves == HALVES) & (significance > significance[:, None])).any(axis=1)
+    shares_peak = (
+        (half_widths_apart(poles) < 1) & (halves.n_halves == HALVES) & (significance > significance[:, None])
+    ).any(axis=1)
     has_own_errors = fitted.noise_from == "misfit"
     is_resolved = has_own_errors & (-poles.real / np.pi > HALVES * fitted.lines.line_hz)
     dropped = inside & (halves.n_halves == 0) & (shares_peak | is_resolved | (significance < DEMANDED))

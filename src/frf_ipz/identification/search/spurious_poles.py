@@ -61,6 +61,22 @@ def find_spurious_poles(data: WeightedLines, fit: RefinedPoles, goodness: Goodne
     return reasons
 
 
+def half_widths_apart(poles: ComplexArray) -> FloatArray:
+    """Measure how far apart poles are.
+
+    Parameters
+    ----------
+    poles : (n,) complex array
+        rad/s.
+
+    Returns
+    -------
+    (n, n) array
+        Distance of each two over the sum of their half widths: below 1 they share a peak.
+    """
+    return np.asarray(np.abs(poles[:, None] - poles) / -(poles.real[:, None] + poles.real))
+
+
 def _stronger_mode_reason(
     number: int, poles: ComplexArray, distance: FloatArray, significance: FloatArray, energy: FloatArray
 ) -> str:
