@@ -108,6 +108,10 @@ class ModelContext:
         """Motion of one DOF, by index."""
         return Motion(rows=(self.model.full_index(dof),), weights=(1.0,))
 
+    def motion_at(self, node: object, direction: object) -> Motion:
+        """Motion of one DOF, by index, as the key of a location names it."""
+        return self.motion(Dof(int(str(node)), str(direction)))
+
     def stiffness_against(self, motion: FloatArray | Motion) -> float:
         """Stiffness against a motion by the elastic modes near the band, N/m; N m/rad against a rotation."""
         shapes, squares, largest = self._elastic_modes

@@ -18,7 +18,6 @@ from frf_ipz.diagnosis.catalogue.effect import (
     list_node_locations,
 )
 from frf_ipz.diagnosis.model.change import Change
-from frf_ipz.dofs import Dof
 from frf_ipz.fe.changes import with_point_masses
 
 if TYPE_CHECKING:
@@ -64,7 +63,7 @@ class MassLoss(Effect):
         node, direction = location.key
         (parameter,) = self.parameters(context, location)
         return Signature(
-            motion=context.motion(Dof(int(str(node)), str(direction))),
+            motion=context.motion_at(node, direction),
             shapes=-(context.contour[None] ** 2),
             values=np.ones((1, 1)),
             amplitudes=np.geomspace(0.05, 1.0, 8) * parameter.high,

@@ -268,8 +268,8 @@ def _group_by_shape(signatures: Sequence[Signature], members: Iterable[int]) -> 
     alike: dict[tuple[int, int], list[int]] = {}
     for member in members:
         signature = signatures[member]
-        count = len(AMPLITUDES) if signature.amplitudes is None else len(signature.amplitudes)
-        alike.setdefault((len(signature.shapes), count if signature.amplitudes is not None else 0), []).append(member)
+        count = 0 if signature.amplitudes is None else len(signature.amplitudes)  # 0: those of all
+        alike.setdefault((len(signature.shapes), count), []).append(member)
     for (n_shapes, count), indices in alike.items():
         n_points = signatures[indices[0]].shapes.shape[1]
         at_once = max(VALUES_AT_ONCE // (n_shapes * (count or len(AMPLITUDES)) * n_points), 1)

@@ -17,7 +17,6 @@ from frf_ipz.diagnosis.catalogue.effect import (
     list_node_locations,
 )
 from frf_ipz.diagnosis.model.change import Change
-from frf_ipz.dofs import Dof
 from frf_ipz.fe.changes import with_point_masses
 
 if TYPE_CHECKING:
@@ -54,7 +53,7 @@ class AddedMass(Effect):
         node, direction = location.key
         amplitudes = np.geomspace(3e-4, 1.0, 14) * context.mass_kg
         return Signature(
-            motion=context.motion(Dof(int(str(node)), str(direction))),
+            motion=context.motion_at(node, direction),
             shapes=context.contour[None] ** 2,
             values=np.ones((1, 1)),
             amplitudes=amplitudes,

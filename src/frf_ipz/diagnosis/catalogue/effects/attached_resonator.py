@@ -21,7 +21,6 @@ from frf_ipz.diagnosis.catalogue.effect import (
 )
 from frf_ipz.diagnosis.model.change import Attachment, Change
 from frf_ipz.diagnosis.model.motion import Motion
-from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -142,4 +141,4 @@ def dynamic_mass(s: ComplexArray, frequency_hz: float, ratio: float) -> ComplexA
 
 def _motion(context: ModelContext, location: Location) -> Motion:
     node, direction = location.key
-    return context.motion(Dof(int(str(node)), str(direction)))
+    return context.motion_at(node, direction)

@@ -13,7 +13,6 @@ from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parame
 from frf_ipz.diagnosis.catalogue.effects.grounded_spring import floating, is_floating
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.diagnosis.model.motion import Motion, make_unit_stiffness
-from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -117,5 +116,5 @@ def _is_new(context: ModelContext, first: int, second: int) -> bool:
 
 def _motion(context: ModelContext, location: Location) -> Motion:
     first, second, direction = location.key[:3]
-    ends = [context.motion(Dof(int(str(node)), str(direction))) for node in (second, first)]
+    ends = [context.motion_at(node, direction) for node in (second, first)]
     return ends[0] - ends[1]

@@ -18,7 +18,6 @@ from frf_ipz.diagnosis.catalogue.effect import (
 )
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.diagnosis.model.motion import Motion, make_unit_stiffness
-from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -118,4 +117,4 @@ def is_floating(location: Location) -> bool:
 
 def _motion(context: ModelContext, location: Location) -> Motion:
     node, direction = location.key[:2]
-    return context.motion(Dof(int(str(node)), str(direction)))
+    return context.motion_at(node, direction)

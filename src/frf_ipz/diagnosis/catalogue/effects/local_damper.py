@@ -19,7 +19,6 @@ from frf_ipz.diagnosis.catalogue.effect import (
 )
 from frf_ipz.diagnosis.model.change import Attachment, Change
 from frf_ipz.diagnosis.model.motion import Motion
-from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -76,4 +75,4 @@ class LocalDamper(Effect):
 
 def _motion(context: ModelContext, location: Location) -> Motion:
     node, direction = location.key
-    return context.motion(Dof(int(str(node)), str(direction)))
+    return context.motion_at(node, direction)

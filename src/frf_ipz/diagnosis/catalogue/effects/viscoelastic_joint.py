@@ -19,7 +19,6 @@ from frf_ipz.diagnosis.catalogue.effect import (
 )
 from frf_ipz.diagnosis.model.change import Attachment, Change
 from frf_ipz.diagnosis.model.motion import Motion
-from frf_ipz.dofs import Dof
 from frf_ipz.fe.kinds.beam import BeamFile
 
 if TYPE_CHECKING:
@@ -172,8 +171,8 @@ def motion_at(context: ModelContext, location: Location) -> Motion:
     """
     kind = location.key[0]
     if kind == "node":
-        return context.motion(Dof(int(str(location.key[1])), str(location.key[2])))
+        return context.motion_at(*location.key[1:])
     if kind == "end":
-        return context.motion(Dof(int(str(location.key[2])), "ry"))
+        return context.motion_at(location.key[2], "ry")
     part = next(part for part in context.model.parts if part.kind == "spring" and part.name == location.key[1])
     return Motion(rows=tuple(part.indices.tolist()), weights=(-1.0, 1.0))
