@@ -27,9 +27,8 @@ BLOCK = 8  # vectors: two more than a body has rigid motions
 CONVERGED = 1e-11  # residual of an eigenpair, of its eigenvalue: the eigenvalue is then right to rounding
 NOISE = 16 * EPS  # of a vector: what remains of it beside the others is rounding
 LOST = 0.5  # of a unit vector that should have been beside the others: less remains of rounding alone
-PASSES = (
-    3  # of orthogonalisation: each removes the rounding of the one before, which a nearly dependent block amplifies
-)
+# of orthogonalisation: each removes the rounding of the one before, which a nearly dependent block amplifies
+PASSES = 3
 MOST_VECTORS = 12  # times what is sought and a block: a sequence so long has lost its digits
 
 

@@ -28,9 +28,8 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import Dof
 
 DENSE_ORDER = 1000  # up to here all eigenvalues are computed, and the message can name the worst DOF
-SINGULAR_MASS = (
-    1e-12  # smallest eigenvalue of the mass matrix scaled to a diagonal of ones: that of a singular one after rounding
-)
+# smallest eigenvalue of the mass matrix scaled to a diagonal of ones: that of a singular one after rounding
+SINGULAR_MASS = 1e-12
 NEGATIVE_STIFFNESS = 1e-10  # of the largest eigenvalue: allowed for rounding of printed digits
 SYMMETRY_TOLERANCE = 1e-6  # of the geometric mean of the two diagonal entries: exports with six digits still pass
 FACTORED_ORDER = 20_000  # beyond, a factor of the stiffness takes long enough to be left to the solve that needs one

@@ -34,6 +34,7 @@ SCATTERS = (0.1, 0.03)  # of the logarithms of frequencies, to start from: what 
 SCATTER_STD = 1.5  # of the logarithm of the scatter, about the last of these
 SWEEPS = 3  # over all unknowns for each start
 MOST_PLACES = 8
+RIGID = 1e-3  # of the lowest measured frequency: a mode of the model below is one of a rigid body, but for rounding
 STEP = 0.05  # of a logarithm, over which the curvature of the evidence is taken
 Q90 = 1.645
 
@@ -146,8 +147,7 @@ def find_attached_masses(model: ReducedModel, measured: MeasuredShapes, places: 
 
 def _log_evidence(model: ModalModel, measured: MeasuredShapes, error: float, scatter: float) -> float:
     """Logarithm of the probability of all directions and frequencies."""
-    elastic = model.omega > 0
-    elastic &= model.omega > 1e-3 * measured.omega.min()
+    elastic = model.omega > RIGID * measured.omega.min()
     total = 0.0
     for mode, omega in enumerate(measured.omega):
         shape = expand_shape(model, measured, mode, error)
