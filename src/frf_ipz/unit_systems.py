@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, fields, is_dataclass, replace
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,12 +17,17 @@ from scipy import sparse
 
 from frf_ipz.dofs import TRANSLATIONS
 from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    import pint
+
     from frf_ipz.arrays import Matrix
     from frf_ipz.dofs import Dof
+else:
+    pint = import_late("pint")
 
 SI = "SI"
 SYSTEMS: Mapping[str, tuple[float, float, float]] = {  # length, mass, time
@@ -194,7 +198,6 @@ def _pint_factor(text: str, unit: str) -> float:
     """Convert by pint; NaN for what is no unit of that dimension."""
     if len(text) > LONGEST or UNIT.fullmatch(text) is None:
         return math.nan
-    pint = import_module("pint")  # late: it takes half a second, and most models name a system or are in SI
     try:
         return float((1.0 * pint.application_registry.Unit(text)).to(unit).magnitude)
     except Exception:

@@ -12,16 +12,17 @@ from __future__ import annotations
 import math
 import re
 from functools import cache
-from importlib import import_module
 from tokenize import TokenError
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import QuantityError
+from frf_ipz.late_imports import import_late
 from frf_ipz.quantities import FrfQuantity, frf_quantity_of
 
 if TYPE_CHECKING:
     import pint
+else:
+    pint = import_late("pint")
 
 EXAMPLES = {
     "force": "N, kN or lbf",
@@ -335,7 +336,7 @@ def unit_ratio(first: str, second: str) -> float | None:
         ratio = float((_parse(first) / _parse(second)).to("").magnitude)
     except QuantityError:
         return None
-    except _pint().PintError:
+    except pint.PintError:
         return math.nan
     return 1.0 if abs(ratio - 1.0) < SAME else ratio
 
@@ -383,14 +384,9 @@ def is_stated(text: str) -> bool:
     return text.strip().lower() not in NOT_STATED
 
 
-def _pint() -> ModuleType:
-    return import_module("pint")  # late: see above
-
-
 @cache
 def _registry() -> pint.UnitRegistry[float]:
-    registry: pint.UnitRegistry[float] = _pint().UnitRegistry()
-    return registry
+    return pint.UnitRegistry()
 
 
 @cache
@@ -399,7 +395,7 @@ def _parse(text: str) -> pint.Quantity[float]:
     try:
         value: pint.Quantity[float] = _registry().Quantity(_registry().parse_expression(expression)) * 1.0
         value.to_base_units()
-    except (_pint().PintError, *UNREADABLE):
+    except (pint.PintError, *UNREADABLE):
         comma = "; write its number with a decimal point" if "," in text else ""
         examples = "write it as in N, m/s^2, g, mm/s or um"
         raise QuantityError(f"'{text}' is no unit that can be read; {examples}{comma}") from None
@@ -431,7 +427,7 @@ def _word(word: str, words: dict[str, str]) -> str:
 def _convert(value: pint.Quantity[float], si: str, problem: str, quantity: str) -> float:
     try:
         factor = float(value.to(si).magnitude)
-    except _pint().PintError:
+    except pint.PintError:
         hint = EXAMPLES.get(quantity) or f"a unit like {si}"
         other = [name for name in MOTIONS if quantity in MOTIONS and value.is_compatible_with(si_unit(name))]
         instead = f', or quantity = "{other[0]}"' if other else ""

@@ -116,9 +116,8 @@ def with_expanded_shapes(
 
 def _split_modes(modes: ExpandedModes) -> tuple[tuple[float, ...], ...]:
     """Frequencies of measured modes that follow the same mode of the model, Hz."""
-    followed = np.array([int(np.argmax(shape.amplitudes**2)) for shape in modes.shapes])
     hertz = natural_frequency_hz(modes.measured.poles)
-    groups = [tuple(hertz[followed == mode].tolist()) for mode in np.unique(followed)]
+    groups = [tuple(hertz[modes.followed == mode].tolist()) for mode in np.unique(modes.followed)]
     return tuple(group for group in groups if len(group) > 1)
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import BoolArray, FloatArray
+from frf_ipz.arrays import BoolArray, FloatArray, IntArray
 from frf_ipz.dofs import GENERALISED, AnyDof, Dof
 from frf_ipz.updating.shape_expansion.random_forces import ExpandedShape, ModalModel, expand_shape
 
@@ -37,8 +37,8 @@ class ExpandedModes:
         What was expanded.
     shapes : tuple of ExpandedShape
         One a measured mode.
-    remains : (m,) bool array
-        Modes of the model that no measured mode follows.
+    followed : (n_modes,) int array
+        Mode of the model that each measured mode follows most: an elastic one.
     gain : float
         Measured over computed amplitudes. Where the test knows its scale, the model's mass is off by it.
     unit : float
@@ -48,9 +48,14 @@ class ExpandedModes:
     model: ModalModel
     measured: MeasuredShapes
     shapes: tuple[ExpandedShape, ...]
-    remains: BoolArray
+    followed: IntArray
     gain: float
     unit: float
+
+    @property
+    def remains(self) -> BoolArray:
+        """(m,) modes of the model that no measured mode follows."""
+        return ~np.isin(np.arange(len(self.model.omega)), self.followed)
 
     @property
     def amplitudes(self) -> FloatArray:
@@ -80,15 +85,15 @@ def expand_modes(model: ReducedModel, measured: MeasuredShapes, *, error: float,
     modal = ModalModel.of(model, measured)
     shapes = tuple(expand_shape(modal, measured, mode, error) for mode in range(len(measured.poles)))
     squares = np.array([shape.amplitudes**2 for shape in shapes])
-    followed = np.unique(squares.argmax(axis=1))
-    remains = ~np.isin(np.arange(len(modal.omega)), followed)
+    # rigid-body modes stay: nothing splits them, and how they share their space is up to rounding
+    followed = np.where(_rigid(model, modal), -1.0, squares).argmax(axis=1)
     # the median over modes of the model that measured ones follow: robust against those that are not understood
-    gain = float(np.median(squares.sum(axis=0)[followed]))
+    gain = float(np.median(squares.sum(axis=0)[np.unique(followed)]))
     return ExpandedModes(
         model=modal,
         measured=measured,
         shapes=shapes,
-        remains=remains,
+        followed=followed,
         gain=gain,
         unit=1.0 if is_scale_known else gain,
     )

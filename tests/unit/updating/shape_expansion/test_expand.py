@@ -1,11 +1,15 @@
 """Measured shapes stand in for an update where what a model lacks is no change of its matrices."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import sparse
 
 import frf_ipz
 from frf_ipz.export.state_space import make_state_space
+from frf_ipz.updating.shape_expansion.expanded_model import expand_modes
+from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes
 from frf_testbench.updating.synthetic_fit import TrueModes, simulate_fit
 
 END_KG, TRANSDUCER_KG = 0.010, 0.006
@@ -130,6 +134,19 @@ def test_an_update_that_meets_the_measurement_stays(left_out):
     updated = frf_ipz.update_model(fit, left_out[1], fe_model=make_nominal())
     assert updated.expansion is None
     assert len(updated.model.dofs) == len(left_out[1].dofs)
+
+
+def test_no_measured_mode_takes_the_place_of_a_rigid_body_mode(left_out):
+    """The two of a free beam share their space up to rounding, which would decide what is predicted."""
+    fit, reduced_model, *_ = left_out
+    measured = measured_shapes(fit)
+    at_outputs, at_inputs = measured.at_outputs.copy(), measured.at_inputs.copy()
+    at_outputs[0], at_inputs[0] = 1 / np.sqrt(len(measured.outputs)), 1 / np.sqrt(len(measured.inputs))
+    moved = replace(measured, at_outputs=at_outputs, at_inputs=at_inputs)
+    modes = expand_modes(reduced_model, moved, error=0.05, is_scale_known=True)
+    assert reduced_model.rigid.shape[1] == 2
+    assert modes.amplitudes[:2, 0] @ modes.amplitudes[:2, 0] > 0.5 * (modes.amplitudes[:, 0] @ modes.amplitudes[:, 0])
+    assert modes.remains[:2].all()
 
 
 def test_a_point_whose_gain_is_off_is_named():
