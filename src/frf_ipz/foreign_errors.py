@@ -13,15 +13,18 @@ import numpy as np
 from frf_ipz.errors import FileFormatError, FrfIpzError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
 LONGEST = 200  # letters of a foreign message
 
 
 @contextmanager
-def errors_of_reader(path: Path, kind: str) -> Iterator[None]:
-    """Turn whatever a library raises on a file into one error that names it; its warnings are not the user's.
+def errors_of_reader(path: Path, kind: str, *, losses: Sequence[str] = ()) -> Iterator[list[str]]:
+    """Turn whatever a library raises on a file into one error that names it.
+
+    What it logs or warns of is an error too where numbers are lost or changed: an error of its log, or one of the
+    reader's ``losses``. Other lines of its log are handed on; other warnings of its code are not the user's.
 
     Parameters
     ----------
@@ -29,46 +32,54 @@ def errors_of_reader(path: Path, kind: str) -> Iterator[None]:
         The file.
     kind : str
         What it should be, such as ``a MATLAB file``.
+    losses : sequence of str
+        Parts of the library's messages by which it says that numbers are missing or not what the file means.
 
     Yields
     ------
-    None
-        While the library reads.
+    list of str
+        While the library reads; holds what it logged otherwise, each once, when it has read.
 
     Raises
     ------
     FileFormatError
         In the place of any error that is none of the package.
     """
+    said: list[str] = []
     try:
-        with warnings.catch_warnings(), _heard_logs() as heard:
-            warnings.simplefilter("ignore")
-            yield
+        with warnings.catch_warnings(record=True) as warned, _heard_logs() as heard:
+            warnings.simplefilter("always")
+            yield said
     except FrfIpzError:
         raise
     except MemoryError:
         raise FileFormatError(path, f"does not fit into memory as {kind}; export less") from None
     except Exception as error:  # a library raises anything on damaged bytes
         raise _damaged(path, kind, str(error) or type(error).__name__) from None
-    if heard:  # it was read all the same, as far as it goes
-        raise _damaged(path, kind, heard[0])
+    for level, text in [*heard, *((logging.WARNING, str(warning.message)) for warning in warned)]:
+        if level >= logging.ERROR or any(loss in text for loss in losses):
+            raise _damaged(path, kind, text)
+    said += dict.fromkeys(_in_one_line(text) for _, text in heard)
 
 
 def _damaged(path: Path, kind: str, text: str) -> FileFormatError:
-    said = " ".join(text.split())[:LONGEST]
     return FileFormatError(
-        path, f"cannot be read as {kind}: it is cut off or damaged ({said}); copy or export it again"
+        path, f"cannot be read as {kind}: it is cut off or damaged ({_in_one_line(text)}); copy or export it again"
     )
 
 
+def _in_one_line(text: str) -> str:
+    return " ".join(text.split())[:LONGEST]
+
+
 @contextmanager
-def _heard_logs() -> Iterator[list[str]]:
+def _heard_logs() -> Iterator[list[tuple[int, str]]]:
     """Keep what libraries log as a warning or worse off the user's screen, and hear it."""
-    heard: list[str] = []
+    heard: list[tuple[int, str]] = []
 
     def hear(record: logging.LogRecord) -> bool:
         if record.levelno >= logging.WARNING:
-            heard.append(record.getMessage())
+            heard.append((record.levelno, record.getMessage()))
         return False
 
     loggers = [logger for logger in logging.root.manager.loggerDict.values() if isinstance(logger, logging.Logger)]

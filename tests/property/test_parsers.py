@@ -4,14 +4,18 @@ A profile with more examples looks longer: ``HYPOTHESIS_PROFILE=long pytest test
 """
 
 import tempfile
+from functools import cache
 from io import BytesIO
 from pathlib import Path
 
+import h5py
 import numpy as np
+import openpyxl
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import sparse
+from scipy import io, sparse
+from scipy.io import wavfile
 
 import frf_ipz
 from data_sets import data_set
@@ -25,7 +29,8 @@ from frf_ipz.fe.matrices.row_tables import read_rows
 from frf_ipz.fe.matrices.stored import MatrixRequest
 from frf_ipz.fe.model_file import read_model
 from frf_ipz.ingest.campaign_file import read_test
-from frf_ipz.ingest.formats.registry import open_recording
+from frf_ipz.ingest.formats.modes_file import ModesSource
+from frf_ipz.ingest.formats.registry import open_recording, read_modes_file
 from frf_ipz.json_files import read_json
 from frf_ipz.pipeline.config import read_pipeline
 from frf_ipz.runs.manifest import load_manifest
@@ -72,6 +77,15 @@ def read_any_matrix(path):
     return read_matrix(MatrixRequest(path=path, what="stiffness"))
 
 
+MODES_ROWS = "mode,frequency_hz,damping_ratio,dof,real,imag\n" + "".join(
+    f"{mode},{10.0 * mode},0.01,{node}:+z,{node / mode},0.0\n" for mode in (1, 2) for node in (1, 2, 3)
+)
+
+
+def read_modes(path):
+    return read_modes_file(ModesSource(path=path))
+
+
 HARWELL_BOEING = """K of a chain
              4             1             1             2             0
 RSA                        3             3             5             0
@@ -81,6 +95,74 @@ RSA                        3             3             5             0
       2.00000000E+00     -1.00000000E+00      2.00000000E+00
      -1.00000000E+00      1.00000000E+00
 """
+SIGNALS = {"force": np.sin(np.arange(24.0)), "acc": np.cos(np.arange(24.0))}
+RATE_HZ = 1024.0
+LABVIEW = """LabVIEW Measurement
+Separator\tTab
+Decimal_Separator\t.
+Multi_Headings\tYes
+X_Columns\tNo
+***End_of_Header***
+
+Channels\t2
+Samples\t24\t24
+X0\t0.0\t0.0
+Delta_X\t0.001\t0.001
+***End_of_Header***
+X_Value\tforce\tacc\tComment
+""" + "".join(f"\t{row}.5\t{row % 5}.25\n" for row in range(24))
+
+
+def write_mat(stream):
+    io.savemat(stream, SIGNALS | {"fs": RATE_HZ, "info": {"unit": "N", "names": np.array(["a", "b"], object)}})
+
+
+def write_hdf5(stream):
+    with h5py.File(stream, "w") as file:
+        for name, values in SIGNALS.items():
+            file.create_dataset(f"day1/{name}", data=values).attrs["unit"] = "N"
+        file["time"] = np.arange(24) / RATE_HZ
+
+
+def write_wav(stream):
+    wavfile.write(stream, int(RATE_HZ), np.column_stack(list(SIGNALS.values())).astype(np.float32))
+
+
+def write_tdms(stream):
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(stream) as writer:
+        writer.write_segment(
+            [nptdms.ChannelObject("a", name, values, {"wf_increment": 1 / RATE_HZ}) for name, values in SIGNALS.items()]
+        )
+
+
+def write_mdf(stream):
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as content, tempfile.TemporaryDirectory() as folder:
+        time = np.arange(24) / RATE_HZ
+        content.append([asammdf.Signal(values, time, name=name, unit="N") for name, values in SIGNALS.items()])
+        stream.write(Path(content.save(Path(folder) / "a.mf4", overwrite=True)).read_bytes())
+
+
+def write_xlsx(stream):
+    book = openpyxl.Workbook()
+    book.active.append(["time", *SIGNALS])
+    for row, values in enumerate(zip(*SIGNALS.values(), strict=True)):
+        book.active.append([row / RATE_HZ, *values])
+    book.save(stream)
+
+
+BINARY = {
+    "K.npz": lambda stream: sparse.save_npz(stream, sparse.csr_array([[2.0, -1.0], [-1.0, 1.0]]), compressed=False),
+    "stage.bin": lambda stream: stream.write(stage_file()),
+    "recording.mat": write_mat,
+    "recording.h5": write_hdf5,
+    "recording.npz": lambda stream: np.savez(stream, time=np.arange(24) / RATE_HZ, **SIGNALS),
+    "recording.wav": write_wav,
+    "recording.tdms": write_tdms,
+    "recording.mf4": write_mdf,
+    "recording.xlsx": write_xlsx,
+}
 PARSERS = {
     "recording.csv": (f"time,force,acc\ns,N,m/s^2\n{ROWS}", read_recording),
     "stamped.csv": (f"sep=;\nDate;force;acc\n{STAMPED}", read_recording),
@@ -110,19 +192,26 @@ PARSERS = {
     "values.json": ('{"a": [1.5, null, "x"], "b": {"c": true}}', read_json),
     "run.json": ('{"frf_ipz_version": "0.3.0", "name": "x", "stages": {"fit": {"files": ["poles.parquet"]}}}', None),
     "stage.bin": (None, read_stage_file),
+    "recording.lvm": (LABVIEW, read_recording),
+    "recording.mat": (None, read_recording),
+    "recording.h5": (None, read_recording),
+    "recording.npz": (None, read_recording),
+    "recording.wav": (None, lambda path: [block.sum() for block in open_recording(path, ["1", "2"]).blocks]),
+    "recording.tdms": (None, read_recording),
+    "recording.mf4": (None, read_recording),
+    "recording.xlsx": (None, read_recording),
+    "modes.csv": (MODES_ROWS, read_modes),
 }
 
 
+@cache
 def valid_bytes(name):
     """Give the bytes of a file as it should be."""
     text = PARSERS[name][0]
     if text is not None:
         return text.encode()
     stream = BytesIO()
-    if name == "K.npz":
-        sparse.save_npz(stream, sparse.csr_array([[2.0, -1.0], [-1.0, 1.0]]), compressed=False)
-    else:
-        return stage_file()
+    BINARY[name](stream)
     return stream.getvalue()
 
 

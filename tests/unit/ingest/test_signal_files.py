@@ -8,6 +8,7 @@ import zipfile
 import numpy as np
 import openpyxl
 import pytest
+from scipy.io import wavfile
 
 import frf_ipz
 from frf_ipz.errors import FileFormatError, InputError
@@ -149,6 +150,42 @@ def test_a_formula_of_an_mdf_file_is_not_run(tmp_path):
         content.save(tmp_path / "a.mf4", overwrite=True)
     with pytest.raises(InputError, match="'force' by a formula or a table"):
         look_at_recording(tmp_path / "a.mf4")
+
+
+def test_a_formula_of_an_mdf_file_costs_its_channel_only(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    values = np.arange(64)
+    with asammdf.MDF(version="4.10") as content:
+        formula = asammdf.Signal(values, values / 100.0, name="force", conversion={"formula": "X1 + 4"})
+        content.append([formula, asammdf.Signal(1.5 * values, values / 100.0, name="acc")])
+        content.save(tmp_path / "a.mf4", overwrite=True)
+    looked = look_at_recording(tmp_path / "a.mf4")
+    assert [column.name for column in looked.columns] == ["acc"]
+    assert looked.notes == (
+        "MDF: not read, for the file converts them by a formula or a table, and only factor and offset are read: force",
+    )
+    (block,) = open_recording(tmp_path / "a.mf4", ["acc"]).blocks
+    np.testing.assert_array_equal(block[:, 1], 1.5 * values)
+    with pytest.raises(InputError, match="'force' by a formula or a table"):
+        open_recording(tmp_path / "a.mf4", ["force"])
+
+
+def test_what_a_library_logs_of_a_whole_file_is_handed_on(tmp_path):
+    write_tdms(tmp_path / "a.tdms")
+    whole = (tmp_path / "a.tdms").read_bytes()
+    (tmp_path / "b.tdms").write_bytes(whole.replace((4712).to_bytes(4, "little"), (4799).to_bytes(4, "little")))
+    recording = open_recording(tmp_path / "b.tdms", NAMES)
+    assert recording.notes == ("TDMS: Unrecognised version number: 4799",)
+    for block, expected in zip(recording.blocks, open_recording(tmp_path / "a.tdms", NAMES).blocks, strict=True):
+        np.testing.assert_array_equal(block, expected)
+
+
+def test_a_sound_file_that_is_cut_off_is_refused(tmp_path):
+    wavfile.write(tmp_path / "a.wav", 2048, np.zeros((4096, 2), np.float32))
+    whole = (tmp_path / "a.wav").read_bytes()
+    (tmp_path / "a.wav").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(FileFormatError, match=r"a\.wav.*cut off or damaged"):
+        look_at_recording(tmp_path / "a.wav")
 
 
 def test_a_spreadsheet_that_defines_entities_or_is_a_bomb_is_refused(tmp_path):

@@ -1,6 +1,7 @@
 """Recordings as ASAM MDF, versions 3 and 4: channels by name, each on the time of its group.
 
-Numbers are converted by factor and offset only; a conversion by a formula of the file would be run as code, and is not.
+Numbers are converted by factor and offset only; a conversion by a formula of the file would be run as code, and is not:
+such a channel cannot be read, and the others can.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader, import_reader
 from frf_ipz.ingest.formats.file_arrays import MOST_EXPANDED
 from frf_ipz.ingest.formats.signal_table import Signal, SignalFormat, SignalTable
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.recording import TableKeys
 
 KIND = "an MDF file"
+LOSSES = ("is outside the file size", "offset too high")  # of the messages of asammdf: blocks that are not there
+BEYOND = "a formula or a table, and only factor and offset are read"
 LINEAR = {"3": {0, 65535}, "4": {0, 1}}  # types of conversions: by factor and offset, or none
 
 
@@ -35,7 +37,8 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
     asammdf = import_reader(path, "asammdf", kind=KIND, extra="mdf")
     data = read_bytes(path)
     signals: list[Signal] = []
-    with errors_of_reader(path, KIND), asammdf.MDF(io.BytesIO(data)) as content:
+    unread: dict[str, str] = {}
+    with errors_of_reader(path, KIND, losses=LOSSES) as said, asammdf.MDF(io.BytesIO(data)) as content:
         linear = LINEAR.get(content.version[0], set())
         sizes = [group.channel_group.cycles_nr * 8 * len(group.channels) for group in content.groups]
         require_expanded(path, sum(sizes), file_bytes=len(data), most_bytes=MOST_EXPANDED)
@@ -46,8 +49,10 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
                     continue
                 signal = content.get(group=number, index=place, raw=True)
                 name = channel.name if names[channel.name] == 1 else f"{channel.name} #{number + 1}"
-                values = _physical(path, name, signal, linear)
-                if values.dtype.kind in "biuf" and values.ndim == 1 and len(values):
+                values = _physical(signal, linear)
+                if values is None:
+                    unread[name] = f"converts '{name}' by {BEYOND}; export it in physical values"
+                elif values.dtype.kind in "biuf" and values.ndim == 1 and len(values):
                     signals.append(
                         Signal(
                             name=name,
@@ -56,18 +61,19 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
                             time=np.asarray(signal.timestamps, np.float64),
                         )
                     )
-    return SignalTable(path=path, signals=tuple(signals))
+    notes = [f"MDF: {text}" for text in said]
+    if unread:
+        notes.append(f"MDF: not read, for the file converts them by {BEYOND}: {', '.join(unread)}")
+    return SignalTable(path=path, signals=tuple(signals), notes=tuple(notes), unread=unread)
 
 
 FORMAT = SignalFormat(rank=10, recognises=_recognises, read=_read)
 
 
-def _physical(path: Path, name: str, signal: Any, linear: set[int]) -> Any:  # noqa: ANN401 - as asammdf has them
+def _physical(signal: Any, linear: set[int]) -> Any:  # noqa: ANN401 - as asammdf has them
+    """Give the values in their unit; None where more than factor and offset leads to them."""
     if signal.conversion is None:
         return np.asarray(signal.samples)
     if signal.conversion.conversion_type not in linear:
-        if signal.samples.dtype.kind not in "biuf":
-            return np.asarray(signal.samples)
-        problem = f"converts '{name}' by a formula or a table"
-        raise FileFormatError(path, f"{problem}, and only factor and offset are read; export it in physical values")
+        return np.asarray(signal.samples) if signal.samples.dtype.kind not in "biuf" else None
     return np.asarray(signal.physical().samples)

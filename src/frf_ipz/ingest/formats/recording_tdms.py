@@ -21,6 +21,13 @@ if TYPE_CHECKING:
 
 KIND = "a TDMS file"
 STEP, OFFSET = "wf_increment", "wf_start_offset"
+LOSSES = (  # of the messages of nptdms: samples that are not there, or are not scaled
+    "less data than expected",
+    "metadata is incomplete",
+    "not a multiple",
+    "Cropping data",
+    "Unsupported scale type",
+)
 UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit")
 
 
@@ -32,7 +39,7 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
     del keys
     nptdms = import_reader(path, "nptdms", kind=KIND, extra="tdms")
     data = read_bytes(path)
-    with errors_of_reader(path, KIND):
+    with errors_of_reader(path, KIND, losses=LOSSES) as said:
         heads = nptdms.TdmsFile.read_metadata(io.BytesIO(data))
         channels = [channel for group in heads.groups() for channel in group.channels()]
         require_expanded(
@@ -47,7 +54,7 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
                 if values.dtype.kind in "biuf" and len(values):
                     name = channel.name if names[channel.name] == 1 else f"{group.name}/{channel.name}"
                     signals.append(_make_signal(name, values, channel.properties))
-    return SignalTable(path=path, signals=tuple(signals))
+    return SignalTable(path=path, signals=tuple(signals), notes=tuple(f"TDMS: {text}" for text in said))
 
 
 FORMAT = SignalFormat(rank=10, recognises=_recognises, read=_read)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.recording import TableKeys
 
 KIND = "a WAV file"
+LOSSES = ("Reached EOF",)  # of the messages of SciPy: samples that are not there
 
 
 def _recognises(head: bytes) -> bool:
@@ -26,7 +27,7 @@ def _recognises(head: bytes) -> bool:
 
 def _read(path: Path, keys: TableKeys) -> SignalTable:
     del keys
-    with errors_of_reader(path, KIND):
+    with errors_of_reader(path, KIND, losses=LOSSES):
         rate_hz, samples = wavfile.read(io.BytesIO(read_bytes(path)))
         columns = np.atleast_2d(samples.T).astype(np.float64)
         note = "numbers as they stand"

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -55,11 +55,14 @@ class SignalTable:
         In their order.
     notes : tuple of str
         What had to be chosen.
+    unread : mapping of str to str
+        Signals that cannot be read, and why; asking for one is an error.
     """
 
     path: Path
     signals: tuple[Signal, ...]
     notes: tuple[str, ...] = ()
+    unread: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -252,6 +255,8 @@ def find_signal(table: SignalTable, column: str) -> Signal:
             raise FileFormatError(table.path, f"{problem}; write the number, as in column = {numbers[0]}")
     if column.isascii() and column.isdigit() and 1 <= int(column[:9]) <= len(table.signals):
         return table.signals[int(column) - 1]
+    if column in table.unread:
+        raise FileFormatError(table.path, table.unread[column])
     names = [signal.name for signal in table.signals]
     problem = f"has no signal '{column}'; {did_you_mean(column, names)}"
     raise FileFormatError(table.path, f"{problem}; correct 'column' of the [[channel]], or name it under 'variables'")
@@ -280,6 +285,8 @@ def even_times(n_samples: int, rate_hz: float, start_s: float = 0.0) -> FloatArr
 def _usual_signals(table: SignalTable) -> tuple[Signal, ...]:
     """Leave out what is no signal beside the others: all that has another length than most samples are in."""
     if not table.signals:
+        for problem in table.unread.values():
+            raise FileFormatError(table.path, problem)
         raise FileFormatError(table.path, "holds no signals; measure or export it again")
     weights: Counter[int] = Counter()
     for signal in table.signals:

@@ -23,6 +23,7 @@ openpyxl = lazy_loader.load("openpyxl")
 KIND = "a spreadsheet"
 ZIP, PARTS = b"PK\x03\x04", b"xl/"  # how the file begins; the folder of its sheets
 LOCAL_NAMES = 1 << 16  # bytes at the start of a file in which a name of a part stands
+LOSSES = ("invalid specification",)  # of the messages of openpyxl: a sheet that it leaves out
 MOST_COLUMNS = 1024  # a recording has no more channels
 MOST_CELLS = 50_000_000
 
@@ -68,7 +69,7 @@ def spreadsheet_text(path: Path, data: bytes) -> bytes:
 
 @lru_cache(maxsize=4)  # a file is opened several times before its numbers are read
 def _text(path: Path, data: bytes) -> bytes:
-    with errors_of_reader(path, KIND):
+    with errors_of_reader(path, KIND, losses=LOSSES):
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = archive.infolist()
             require_expanded(

@@ -406,4 +406,4 @@ def describe_functions(functions: Sequence[UniversalFunction]) -> str:
     for function in functions:
         counts[function.function_type] = counts.get(function.function_type, 0) + 1
     names = (f"{count} of type {kind} ({FUNCTION_TYPES.get(kind, 'unknown')})" for kind, count in counts.items())
-    return ", ".join(names) or "none"
+    return ", ".join(names) or "other data sets only"
