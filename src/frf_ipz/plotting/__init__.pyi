@@ -1,5 +1,6 @@
 from .figures import draw_pictures as draw_pictures
 from .figures import save_figure as save_figure
+from .plots import plot_cmif as plot_cmif
 from .plots import plot_coherence as plot_coherence
 from .plots import plot_convergence as plot_convergence
 from .plots import plot_fit as plot_fit

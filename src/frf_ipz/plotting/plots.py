@@ -20,6 +20,7 @@ from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.ingest.frf_estimate import FrfEstimate
 from frf_ipz.late_imports import import_late
 from frf_ipz.pairing.pairs import Pairs
+from frf_ipz.plotting.cmif import describe_cmif
 from frf_ipz.plotting.diagnosis import describe_mismatch, describe_proof, describe_ranking
 from frf_ipz.plotting.figures import draw_panel
 from frf_ipz.plotting.frfs import describe_fit, describe_frfs
@@ -30,6 +31,7 @@ from frf_ipz.plotting.records import describe_forces, describe_responses
 from frf_ipz.plotting.structure import StructureMarks, describe_structure
 from frf_ipz.plotting.updating import describe_convergence, describe_stiffness_change, describe_targets
 from frf_ipz.prediction.prediction import Prediction
+from frf_ipz.runs.picture_data import mode_indicator
 from frf_ipz.structure import Geometry
 from frf_ipz.updating.targets import Target
 from frf_ipz.updating.updated_model import UpdatedModel
@@ -339,6 +341,44 @@ def plot_misfit(frfs: FrfSet, fit: ModalFit, *, ax: Axes | None = None) -> Axes:
     require_type("frfs", frfs, FrfSet)
     require_type("fit", fit, ModalFit)
     return draw_panel(describe_fit(frfs, fit), ax, panel=1)
+
+
+def plot_cmif(frfs: FrfSet, fit: ModalFit | None = None, *, ax: Axes | None = None) -> Axes:
+    """Draw the complex mode indicator function, and the modes of a fit.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        Measured FRFs.
+    fit : ModalFit, optional
+        Its modes are marked.
+    ax : Axes, optional
+        Where to draw; axes of a new figure where it is left out.
+
+    Returns
+    -------
+    Axes
+        With the picture.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> beam = frf_ipz.make_beam(
+    ...     length_m=0.5, width_m=0.02, thickness_m=0.005, youngs_modulus_Pa=70e9, density_kg_m3=2700, elements=10,
+    ...     left="clamped", modal_ratio=0.01,
+    ... )
+    >>> lines = np.arange(5, 400.0, 0.5)
+    >>> tip, middle = frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")
+    >>> labels = [frf_ipz.FrfLabel(output, tip, frf_ipz.FrfQuantity.ACCELERANCE) for output in (middle, tip)]
+    >>> values = frf_ipz.compute_frfs(beam, labels, 2j * np.pi * lines)[:, :, None]
+    >>> frfs = frf_ipz.FrfSet.from_arrays(lines, values, outputs=[middle, tip], inputs=[tip])
+    >>> ax = frf_ipz.plotting.plot_cmif(frfs)
+    >>> ax.get_ylabel()
+    'Accelerance, m/s^2/N'
+    """
+    require_type("frfs", frfs, FrfSet)
+    require_type("fit", fit, ModalFit, optional=True)
+    return draw_panel(describe_cmif(mode_indicator(frfs), fit), ax)
 
 
 def plot_stabilization(fit: ModalFit, frfs: FrfSet | None = None, *, ax: Axes | None = None) -> Axes:

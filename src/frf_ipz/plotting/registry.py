@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.plotting.cmif import describe_cmif
 from frf_ipz.plotting.diagnosis import (
     describe_data_checks,
     describe_expected_misfit,
@@ -35,7 +36,13 @@ from frf_ipz.plotting.updating import (
     describe_targets,
 )
 from frf_ipz.prediction.reference import measured_at
-from frf_ipz.runs.picture_data import changed_parts, models_beside_measurement, shape_agreements, update_targets
+from frf_ipz.runs.picture_data import (
+    changed_parts,
+    mode_indicator,
+    models_beside_measurement,
+    shape_agreements,
+    update_targets,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -167,6 +174,10 @@ def _fit(run: Results) -> list[Picture]:
     return [] if run.fit is None or run.frfs is None else [describe_fit(run.frfs, run.fit)]
 
 
+def _cmif(run: Results) -> list[Picture]:
+    return [] if run.frfs is None else [describe_cmif(mode_indicator(run.frfs), run.fit, band_hz=run.band_hz)]
+
+
 def _stabilization(run: Results) -> list[Picture]:
     return [describe_stabilization(run.fit, run.frfs)] if run.fit is not None and len(run.fit.stabilization) else []
 
@@ -259,6 +270,7 @@ PICTURES: dict[str, _Entry] = {
     "frfs": _Entry(("ingest",), _frfs),
     "phases": _Entry(("ingest",), lambda run: [select_panel(picture, 1) for picture in _frfs(run)]),
     "coherence": _Entry(("ingest",), _coherence, "the coherence of these FRFs is not known"),
+    "cmif": _Entry(("ingest",), _cmif),
     "stabilization": _Entry(("fit",), _stabilization, "the fit has kept no diagram"),
     "poles": _Entry(("fit",), _of("fit", describe_pole_zero_map)),
     "fit": _Entry(("ingest", "fit"), _fit),

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-    from frf_ipz.frf import FrfLabel
+    from frf_ipz.dofs import AnyDof
+    from frf_ipz.frf import FrfLabel, FrfSet
     from frf_ipz.runs.results import Results
 else:
     pd = import_late("pandas")
@@ -82,6 +83,30 @@ class ShapeAgreement:
     measured_hz: FloatArray
     computed_hz: FloatArray
     mac: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModeIndicator:
+    """The complex mode indicator function of measured FRFs.
+
+    Parameters
+    ----------
+    frequency_hz : (n_lines,) array
+        Hz.
+    values : (n_lines, n_values) array
+        Singular values of the FRF matrix at each line, the largest first; each peaks at the modes, and the second one
+        where two modes share a peak.
+    outputs, inputs : tuple of Dof
+        What the matrix connects: the largest part of it in which every output was measured with every input.
+    title : str
+        Quantity and unit of the singular values.
+    """
+
+    frequency_hz: FloatArray
+    values: FloatArray
+    outputs: tuple[AnyDof, ...]
+    inputs: tuple[AnyDof, ...]
+    title: str
 
 
 def hidden_frfs(run: Results) -> list[int]:
@@ -182,6 +207,60 @@ def shape_agreements(run: Results) -> list[ShapeAgreement]:
             )
         )
     return agreements
+
+
+def mode_indicator(frfs: FrfSet) -> ModeIndicator:
+    """Compute the complex mode indicator function.
+
+    C. Y. Shih, Y. G. Tsuei, R. J. Allemang and D. L. Brown, Complex mode indication function and its applications to
+    spatial domain parameter estimation, Mech. Syst. Signal Process. 2 (1988) 367-377,
+    doi:10.1016/0888-3270(88)90060-X.
+
+    Parameters
+    ----------
+    frfs : FrfSet
+        Measured FRFs. Where they are of several quantities, all are turned into that of the first; where they are of
+        several units, as of forces and moments, those of the commonest one are taken.
+
+    Returns
+    -------
+    ModeIndicator
+        Its singular values. An entry that was not measured has no place in them: with a zero for it, one mode would
+        have two peaks.
+    """
+    quantity = frfs.labels[0].quantity
+    units = [quantity.unit(label.output_dof.direction, label.input_dof.direction) for label in frfs.labels]
+    unit = max(dict.fromkeys(units), key=units.count)
+    places = {
+        (label.output_dof.unsigned, label.input_dof.unsigned): frf
+        for frf, label in enumerate(frfs.labels)
+        if units[frf] == unit
+    }
+    outputs, inputs = _largest_block(set(places))
+    columns = [[places[output, input_dof] for input_dof in inputs] for output in outputs]
+    powers = quantity.power - np.array([label.quantity.power for label in frfs.labels])
+    s = np.where(frfs.s == 0, 1.0, frfs.s)  # of the line at 0 Hz only FRFs of one quantity are comparable
+    values = frfs.values * np.where(powers == 0, 1.0, s[:, None] ** powers)
+    return ModeIndicator(
+        frequency_hz=frfs.frequency_hz,
+        values=np.asarray(np.linalg.svd(values[:, columns], compute_uv=False), float),
+        outputs=outputs,
+        inputs=inputs,
+        title=f"{quantity.value.capitalize()}, {unit}",
+    )
+
+
+def _largest_block(measured: set[tuple[AnyDof, AnyDof]]) -> tuple[tuple[AnyDof, ...], tuple[AnyDof, ...]]:
+    """Choose outputs and inputs that were all measured with each other: most singular values, then most FRFs."""
+    inputs_of: dict[AnyDof, set[AnyDof]] = {}
+    for output, input_dof in measured:
+        inputs_of.setdefault(output, set()).add(input_dof)
+    blocks = []
+    for inputs in {frozenset(inputs) for inputs in inputs_of.values()}:
+        outputs = [output for output, others in inputs_of.items() if inputs <= others]
+        blocks.append((sorted(outputs, key=str), sorted(inputs, key=str)))
+    best = max(blocks, key=lambda block: (min(map(len, block)), len(block[0]) * len(block[1]), str(block)))
+    return tuple(best[0]), tuple(best[1])
 
 
 def update_targets(run: Results) -> list[Target]:

@@ -24,6 +24,7 @@ def calls(results):
     frfs, fit = results["ingest"].frfs, results["fit"]
     targets = target_rows(results["update"], results["pair"])
     return {
+        "plot_cmif": (frfs, fit),
         "plot_coherence": (frfs,),
         "plot_convergence": (results["update"],),
         "plot_fit": (frfs, fit),

@@ -1,4 +1,4 @@
-"""Stabilisation diagram: poles over model orders, what was taken, and why."""
+"""Where the modes are: indicator function, poles over model orders, what was taken, and why."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def build(run: Results) -> Section | None:
         f"{int(fit.stabilization['order'].max())}; {n_taken} of them were where the fit started, and "
         f"{counted(fit.n_modes, 'mode')} remained."
     )
-    blocks: list[Block] = [*run_figures(run, "stabilization")]
+    blocks: list[Block] = [*run_figures(run, "cmif", "stabilization")]
     blocks += [_decisions(fit.decisions)] if len(fit.decisions) else []
     return Section(anchor="stabilization", title="Stabilisation", lead=lead, blocks=tuple(blocks))
 
