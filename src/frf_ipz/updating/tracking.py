@@ -330,13 +330,18 @@ def _own_overlap(old: Roots, new: Roots, mass: FloatArray, norm: ComplexArray) -
     """Overlap of each root with itself; see `_overlap`."""
     forward = np.sum(old.left_vectors * (mass @ new.right_vectors), axis=0)
     backward = np.sum(new.left_vectors * (mass @ old.right_vectors), axis=0)
-    return np.asarray(np.abs(forward * backward) / np.abs(old.slope * norm))
+    return _over(np.abs(forward * backward), np.abs(old.slope * norm))
 
 
 def _overlap(old: Roots, new: Roots, mass: FloatArray, norm: ComplexArray) -> FloatArray:
     forward = old.left_vectors.T @ mass @ new.right_vectors
     backward = new.left_vectors.T @ mass @ old.right_vectors
-    return np.asarray(np.abs(forward * backward.T) / np.abs(np.outer(old.slope, norm)))
+    return _over(np.abs(forward * backward.T), np.abs(np.outer(old.slope, norm)))
+
+
+def _over(products: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Divide; 0 where a size is 0, which is that of a zero on its way to infinity."""
+    return np.divide(products, sizes, out=np.zeros_like(products), where=sizes > 0)
 
 
 def _assign(cost: FloatArray) -> IntArray:

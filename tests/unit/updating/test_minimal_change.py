@@ -5,16 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy import sparse
+from scipy import linalg, sparse
 
+from frf_ipz.dofs import Dof
 from frf_ipz.fe.reduction.options import ReduceOptions
-from frf_ipz.fe.reduction.reduce import reduce_to_dofs
+from frf_ipz.fe.reduction.reduce import reduce_model, reduce_to_dofs
+from frf_ipz.frf import FrfLabel, FrfQuantity
 from frf_ipz.numerics.pencils import damped_poles, undamped_poles
+from frf_ipz.pairing.model_roots import model_zeros
 from frf_ipz.pairing.pair import pair_roots
 from frf_ipz.pairing.pairs import Pairs
+from frf_ipz.progress import silent
+from frf_ipz.structure import StructuralModel
+from frf_ipz.updating.methods.minimal_change import update
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, make_structural_basis
+from frf_ipz.updating.problem import make_problem
 from frf_ipz.updating.regions import reduced_regions
+from frf_ipz.updating.tracking import _over
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
 from frf_testbench.updating.random_structures import draw_structure, scale_stiffness
@@ -211,3 +219,46 @@ def test_the_history_has_every_iteration(updated):
     columns = [name for name in updated.history.columns if name.startswith("stiffness of element")]
     assert columns
     assert updated.history[updated.history.phase == "stiffness"][columns].notna().all().all()
+
+
+@pytest.fixture(scope="module")
+def chain():
+    """Fit of a free chain of masses with a soft spring, struck at one end and measured at the other too."""
+
+    def make(soft):
+        stiffness = np.zeros((5, 5))
+        for place, rate in enumerate((5.9e5, soft * 7.1e5, 7.9e5, 6.7e5)):
+            stiffness[place : place + 2, place : place + 2] += rate * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        return StructuralModel.from_matrices(
+            sparse.csr_array(np.diag([9.1, 12.3, 9.8, 11.3, 11.9])),
+            sparse.csr_array(stiffness),
+            dofs=[f"{node}:x" for node in range(1, 6)],
+            modal_damping=0.008,
+        )
+
+    labels = tuple(FrfLabel(Dof(node, "x"), Dof(1, "x"), FrfQuantity.ACCELERANCE) for node in (1, 3, 4, 5))
+    fit = simulate_fit(TrueModes(make(0.65), np.full(5, 0.007)), labels, (5.0, 145.0), rng=np.random.default_rng(1))
+    return fit, make(1.0)
+
+
+def test_a_zero_that_only_damping_makes_spoils_no_update(chain):
+    """Between the ends of a chain there is none without damping: in the update it runs to infinity."""
+    fit, nominal = chain
+    reduced_model = reduce_model(fit, nominal)
+    problem = make_problem(reduced_model, fit, pair_roots(fit, reduced_model), basis=None)
+    zeros = model_zeros(reduced_model, fit.labels[-1:])[0].values
+    (made,) = zeros[(zeros.real > 0) & (zeros.imag > 0)][:1]
+    with_one_more = replace(
+        problem,
+        values=np.append(problem.values, 1.05 * made),
+        computed=np.append(problem.computed, made),
+        covariance=linalg.block_diag(np.asarray(problem.covariance), np.eye(2)),
+        frf=np.append(problem.frf, len(fit.labels) - 1),
+        names=(*problem.names, "a zero of damping"),
+    )
+    plain, spoilt = (update(given, UpdateOptions(), silent) for given in (problem, with_one_more))
+    assert_allclose(spoilt.after[:-1], plain.after, rtol=1e-4)
+
+
+def test_overlaps_with_a_root_at_infinity_are_none():
+    assert np.array_equal(_over(np.array([2.0, 3.0]), np.array([4.0, 0.0])), [0.5, 0.0])

@@ -40,6 +40,7 @@ else:
 
 SMALLEST_NOISE = 1e-6  # relative standard deviation of a frequency: none is measured better
 EXCLUDED_STD = 1.0  # relative standard deviation of an excluded target
+OF_DAMPING = 1.0  # change of the logarithm of a modulus by damping, from which damping makes a root
 SHIFTED = 0.1  # standard deviations of a modulus from which the stiffness is updated again for the change by damping
 
 
@@ -66,14 +67,16 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     phase = _stiffness_phase(problem, frame)
     start = phase.nominal_roots(problem.computed)
     stated = _change_by_damping(problem.computed, start)
-    phase = replace(phase, targets=phase.targets - stated)
+    # a zero that is there by damping only tells nothing of stiffness
+    of_damping = np.where(np.abs(stated) > OF_DAMPING, stated**2, 0.0)
+    phase = replace(phase, targets=phase.targets - stated, noise=phase.noise.plus(of_damping))
     excluded, likely = contradicted_targets(phase, start)
     is_excluded = np.isin(np.arange(len(phase.target_roots.frf)), excluded)
     phase = replace(phase, noise=phase.noise.plus(np.where(is_excluded, EXCLUDED_STD**2, 0.0)))
     result = iterate(phase, start, likely=likely, max_iterations=options.max_iterations)
     progress(0.5, "damping")
     inner = modal_frame(*phase.matrices(result.theta))
-    damping = _damping_phase(problem, frame, inner, phase, result)
+    damping = _damping_phase(problem, frame, inner, phase, result, of_damping)
     damped = iterate(damping, damping.initial_roots(), start=damping.start())
     history = [("stiffness", result), ("damping", damped)]
     shift = _change_by_damping(damped.tracked.values(len(stated)), result.tracked) - stated
@@ -123,7 +126,12 @@ def _stiffness_phase(problem: UpdateProblem, frame: ModalFrame) -> StiffnessPhas
 
 
 def _damping_phase(
-    problem: UpdateProblem, frame: ModalFrame, inner: ModalFrame, phase: StiffnessPhase, result: PhaseResult
+    problem: UpdateProblem,
+    frame: ModalFrame,
+    inner: ModalFrame,
+    phase: StiffnessPhase,
+    result: PhaseResult,
+    of_damping: FloatArray,
 ) -> DampingPhase:
     rows = phase.target_roots.rows.items()
     real_part = np.tile([-1.0, 0.0], (len(problem.values), 1))
@@ -136,7 +144,7 @@ def _damping_phase(
         inner.to_modal(frame.to_modal(problem.model.damping) + _damping_by_stiffness(phase, result.theta)),
         _dashpots(problem, frame, inner),
         problem.values,
-        project(problem.covariance, real_part),
+        project(problem.covariance, real_part).plus(of_damping * np.abs(problem.values) ** 2),
         1j * np.sqrt(result.tracked.values(len(problem.values))),
     )
 

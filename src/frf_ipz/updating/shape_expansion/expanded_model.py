@@ -171,7 +171,8 @@ def build_expanded_model(
     mass, damping, stiffness = matrices(amplitudes)
     roots = [_root(shape.covariance) * calibration / np.sqrt(modes.unit) for shape in modes.shapes]
     rng = np.random.default_rng(seed)
-    normal = rng.standard_normal((count, len(roots), len(modal.omega)))
+    # drawn at the DOFs: signs of modes, and how equal ones share their space, are up to rounding
+    normal = rng.standard_normal((count, len(roots), len(model.mass))) @ (modal.shapes.T @ _root(model.mass)).T
     members = [
         matrices(amplitudes + np.stack([root @ draw for root, draw in zip(roots, draws, strict=True)], axis=1))
         for draws in normal
@@ -223,9 +224,10 @@ def _completion(retained: FloatArray) -> FloatArray:
     return np.asarray(right[len(retained) :] * np.exp(np.mean(np.log(sizes))))
 
 
-def _root(covariance: FloatArray) -> FloatArray:
-    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+def _root(matrix: FloatArray) -> FloatArray:
+    """Symmetric square root."""
+    values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
 def _with_hidden(model: ReducedModel, count: int) -> tuple[FloatArray, tuple[AnyDof, ...]]:
