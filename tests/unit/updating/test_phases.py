@@ -76,7 +76,8 @@ def test_damping_slopes_against_differences(case, has_damper):
     frame = frame_of(problem.model)
     phase = minimal_change._stiffness_phase(problem, frame)
     result = iterate(phase, phase.nominal_roots(problem.computed))
-    damping = minimal_change._damping_phase(problem, frame, modal_frame(*phase.matrices(result.theta)), phase, result)
+    inner = modal_frame(*phase.matrices(result.theta))
+    damping = minimal_change._damping_phase(problem, frame, inner, phase, result, np.zeros(len(problem.values)))
     count = damping.terms[0].root.shape[0]
     theta = 0.02 * np.random.default_rng(1).standard_normal(count)
     slopes = damping.slopes(theta, damping.roots(theta))
