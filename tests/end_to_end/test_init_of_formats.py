@@ -14,8 +14,10 @@ import frf_ipz
 from array_files import write_matlab_7_3
 from data_sets import NONE
 from frf_ipz.cli import main as command
+from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.pipeline.check.setup import describe_setup
+from frf_ipz.pipeline.init.folder_contents import look_into
 from frf_ipz.pipeline.init.starting_files import write_starting_files
 from frf_ipz.pipeline.inputs import read_inputs
 from small_campaign import RATE, accelerance, blow
@@ -217,3 +219,25 @@ def test_a_folder_becomes_a_page(tmp_path, kind, monkeypatch):
             command.main()
         assert not stop.value.code
     assert (tmp_path / "out" / "report.html").stat().st_size > 100_000
+
+
+def test_a_file_beside_the_frfs_that_cannot_be_read_is_left_out_and_said(tmp_path):
+    rows = "".join(f"{hz} 1.0 {hz}\n" for hz in range(1, 40))
+    (tmp_path / "H1.txt").write_text("Frequency Real Imag\n" + rows)
+    (tmp_path / "setup.csv").write_text("xHammer,0,0\nzHammer,0.1,0.2\n")
+    pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12\n"
+    (tmp_path / "H2.wav").write_text(pointer)
+    contents = look_into(tmp_path)
+    assert [path.name for path in contents.frfs] == ["H1.txt"]
+    said = {path.name: reason for path, reason in contents.unread.items()}
+    assert said["setup.csv"].startswith("holds no line that begins with a number")
+    assert said["H2.wav"] == "is a pointer of Git LFS and not the file itself; run: git lfs pull"
+    (tmp_path / "H1.txt").unlink()
+    with pytest.raises(InputError, match=r"setup\.csv: holds no line"):
+        look_into(tmp_path)
+
+
+def test_a_text_table_without_time_is_named(tmp_path):
+    (tmp_path / "accel.txt").write_text("".join(f"{row % 7} {row}\n" for row in range(40)))
+    with pytest.raises(InputError, match=r"accel\.txt: is a table without a column of time"):
+        look_into(tmp_path)

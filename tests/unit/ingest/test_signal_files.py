@@ -1,5 +1,6 @@
 """Recordings in files of acquisition programs: LabVIEW, TDMS, WAV, MDF, spreadsheets."""
 
+import gc
 import io
 import struct
 import wave
@@ -168,6 +169,17 @@ def test_a_formula_of_an_mdf_file_costs_its_channel_only(tmp_path):
     np.testing.assert_array_equal(block[:, 1], 1.5 * values)
     with pytest.raises(InputError, match="'force' by a formula or a table"):
         open_recording(tmp_path / "a.mf4", ["force"])
+
+
+def test_a_library_that_fails_to_close_a_damaged_file_prints_nothing(tmp_path, monkeypatch):
+    unraisable = []
+    write_mdf(tmp_path / "a.mf4")
+    (tmp_path / "a.mf4").write_bytes((tmp_path / "a.mf4").read_bytes()[:100])
+    monkeypatch.setattr("sys.unraisablehook", unraisable.append)
+    with pytest.raises(FileFormatError, match="cut off or damaged"):
+        look_at_recording(tmp_path / "a.mf4")
+    gc.collect()
+    assert not unraisable
 
 
 def test_what_a_library_logs_of_a_whole_file_is_handed_on(tmp_path):

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
+POINTER = b"version https://git-lfs.github.com/"
 HEAD = 1 << 16  # bytes from which the layout is found
 LONGEST_HEAD = 1 << 22  # bytes that may stand before the numbers
 BOM = b"\xef\xbb\xbf"
@@ -199,12 +200,14 @@ def read_head(path: Path) -> bytes:
     Raises
     ------
     FileFormatError
-        If there is no such file, it cannot be read, or is empty.
+        If there is no such file, it cannot be read, is empty, or stands for a file that was not fetched.
     """
     with open_input(path) as stream:
         head = stream.read(HEAD)
     if not head.strip():
         raise FileFormatError(path, EMPTY)
+    if head.startswith(POINTER):
+        raise FileFormatError(path, "is a pointer of Git LFS and not the file itself; run: git lfs pull")
     return spreadsheet_text(path, read_bytes(path))[:HEAD] if is_spreadsheet(head) else head
 
 

@@ -19,6 +19,10 @@ TEXT = (".txt", ".dat", ".asc", ".tsv", ".prn", ".xlsx")  # may be a table, and 
 OTHER = (".toml", ".py", ".m", ".md", ".json", ".html", ".mtx")  # settings, programs, results
 DECKS = (".sti", ".mas", ".dof", ".full", ".inp", ".bdf", ".op4", ".op2", ".asm", ".pch")  # of FE programs
 ARRAYS = (".npz", ".npy")  # matrices where they are called so, else recordings or FRFs
+UNTIMED = (
+    "is a table without a column of time that grows by equal steps; where it is a recording, call it .csv, and write "
+    "sample_rate_hz under [test]"
+)
 FEWEST_ROWS = 16  # of a recording
 DOF_COLUMNS = frozenset({"node", "direction"})
 UNIVERSAL = (".unv", ".uff")
@@ -103,14 +107,14 @@ def look_into(folder: Path) -> FolderContents:
     modes += [path for path in files if path.suffix.lower() in UNIVERSAL and holds_shapes(path)]
     found: dict[str, list[Path]] = {"recording": [], "frf": []}
     unread: dict[Path, str] = {}
+    tables: list[FileFormatError] = []  # that cannot be read
     for path in files:
         if path in {*dof_tables, *modes} or path.suffix.lower() in {*OTHER, *DECKS} or _is_array_of_model(path):
             continue
         try:
             kind = _kind(path)
         except FileFormatError as error:
-            if path.suffix.lower() == CSV:
-                raise
+            tables += [error] if path.suffix.lower() == CSV else []
             unread[path] = str(error).partition(": ")[2]
             continue
         if kind:
@@ -119,6 +123,8 @@ def look_into(folder: Path) -> FolderContents:
     references = tuple(path for path in all_frfs if recordings or modes or KEPT_ASIDE.search(path.stem))
     frfs = tuple(path for path in all_frfs if path not in references)
     if not recordings and not frfs and not modes:
+        if tables:
+            raise tables[0]
         hint = "".join(f"; {path.name}: {reason}" for path, reason in list(unread.items())[:1])
         problem = "holds no recordings and no FRFs in a format that is read (CSV, text, UFF, MATLAB, HDF5, ...)"
         raise InputError(f"{folder}: {problem}; put them there, one file an impact, then run init again{hint}")
@@ -149,6 +155,8 @@ def _kind(path: Path) -> str:
     if not is_known and path.suffix.lower() != CSV and not _is_table(path):
         return ""
     contents = look_at_recording(path)
+    if path.suffix.lower() in TEXT and not contents.has_time:
+        raise FileFormatError(path, UNTIMED)
     is_recording = path.suffix.lower() == CSV or contents.has_time
     return "recording" if is_recording and contents.columns else ""
 
@@ -177,7 +185,11 @@ def _is_hidden(path: Path, folder: Path) -> bool:
 
 
 def _columns(path: Path) -> frozenset[str]:
-    return frozenset(name.strip().lower() for fields in sniff(path).header for name in fields)
+    try:
+        layout = sniff(path)
+    except FileFormatError:  # said where its kind is asked for
+        return frozenset()
+    return frozenset(name.strip().lower() for fields in layout.header for name in fields)
 
 
 def _sort_matrices(files: list[Path]) -> tuple[dict[str, Path], dict[str, dict[str, Path]]]:
