@@ -14,15 +14,15 @@ NOISE = 0.02
 HEIGHTS = (100.0, 60.0, 150.0, 80.0, 120.0)
 
 
-def estimate(folder, change, *, impacts=5, bad=(2,), seed=3, **options):
+def estimate(folder, change, *, impacts=5, bad=(2,), seed=3, structure=None, body=HIT, **options):
     """Write impacts, of which some are changed, and estimate their FRFs."""
     rng = np.random.default_rng(seed)
     for number in range(impacts):
-        signals = impact(Structure(), noise=NOISE, rng=rng, height=HEIGHTS[number])
+        signals = impact(structure or Structure(), noise=NOISE, rng=rng, height=HEIGHTS[number])
         if number in bad:
             signals = change(signals)
         write_csv(folder / "hits" / f"hit_{number + 1}.csv", signals, STEP_S)
-    return estimate_frfs(read_test(write_test(folder, HIT)), options=IngestOptions(**options))
+    return estimate_frfs(read_test(write_test(folder, body)), options=IngestOptions(**options))
 
 
 def reverse_one(signals):
@@ -167,15 +167,61 @@ def test_two_impacts_that_differ_by_a_gain_are_said_to(tmp_path):
     assert not estimate(tmp_path / "sound", amplify, impacts=2, bad=()).warnings
 
 
-def test_of_two_impacts_none_is_right(tmp_path):
+def test_of_two_impacts_of_opposite_sign_one_is_used_and_it_is_said_that_it_may_be_the_wrong_one(tmp_path):
     result = estimate(tmp_path, reverse_all, impacts=2, bad=(1,))
-    (text,) = result.warnings
-    assert text == (
-        "hits/hit_1.csv and hits/hit_2.csv contradict each other: acc_1 and acc_2 agree only with the opposite sign; "
-        "which is right does not show in two: drop one by [ingest] drop, or record a third"
+    assert result.warnings[0] == (
+        "hits/hit_2.csv is left out: contradicts the other impacts: all responses have the opposite sign, as if struck "
+        "from the other side, and which is right does not show in two: drop the wrong one by [ingest] drop, or record "
+        "a third; without that, hits/hit_1.csv is used"
     )
+    assert truth_error(result).max() < 0.01
+    other = estimate(tmp_path / "other", reverse_all, impacts=2, bad=(0,), drop=("hit_1.csv",))
+    assert not [text for text in other.warnings if "contradicts" in text]
     exchanged = estimate(tmp_path / "exchanged", exchange, impacts=2, bad=(1,))
-    assert "acc_1 and acc_2 agree only when exchanged" in exchanged.warnings[0]
+    assert "contradicts the other impacts: acc_1 and acc_2 are exchanged, and which is right" in exchanged.warnings[0]
+    assert truth_error(exchanged).max() < 0.01
+
+
+def test_of_two_impacts_a_reversed_channel_is_left_out_of_one(tmp_path):
+    result = estimate(tmp_path, reverse_one, impacts=2, bad=(1,))
+    assert result.records.used.all()
+    assert list(result.frfs.averages) == [1, 2]
+    assert truth_error(result).max() < 0.01
+
+
+@pytest.mark.parametrize("bad", [0, 1])
+def test_the_driving_point_tells_which_of_two_impacts_is_reversed(tmp_path, bad):
+    structure = Structure(shapes=((1.0, 0.7, 0.5), (0.6, -0.8, 0.9)))
+    struck = HIT.replace("7:+z", "1:+z")
+    result = estimate(tmp_path, reverse_all, impacts=2, bad=(bad,), structure=structure, body=struck)
+    assert list(result.records.used) == [number != bad for number in range(2)]
+    assert "acc_1, at the point of the force, would give power to it" in result.records.marks[bad]
+
+
+@pytest.mark.parametrize("bad", [0, 1])
+@pytest.mark.parametrize("change", [lose_samples, lose_samples_late])
+def test_of_two_or_three_impacts_the_one_with_lost_samples_is_told(tmp_path, change, bad):
+    for impacts in (2, 3):
+        result = estimate(tmp_path / str(impacts), change, impacts=impacts, bad=(bad,), exponential_window_s=0.2)
+        assert list(result.records.used) == [number != bad for number in range(impacts)]
+        assert "samples are lost" in result.records.marks[bad]
+        assert truth_error(result).max() < 0.01
+
+
+@pytest.mark.parametrize("bad", [0, 1])
+def test_impacts_at_other_points_tell_which_of_two_forces_is_reversed(tmp_path, bad):
+    for number in range(3):
+        signals = impact(Structure(), noise=NOISE, rng=np.random.default_rng(number), height=90.0)
+        write_csv(tmp_path / "others" / f"hit_{number}.csv", signals, STEP_S)
+    body = HIT + HIT.replace("7:+z", "8:+z").replace("hits/", "others/")
+
+    def reverse_force(signals):
+        signals[0] *= -1
+        return signals
+
+    result = estimate(tmp_path, reverse_force, impacts=2, bad=(bad,), body=body)
+    assert list(result.records.used) == [number != bad for number in range(2)] + [True] * 3
+    assert "that of its force too, against the impacts at other points" in result.records.marks[bad]
 
 
 def test_the_user_keeps_what_contradicts(tmp_path):

@@ -21,6 +21,7 @@ from frf_ipz.ingest.survey.contradictions import (
     leave_out,
     noise_scales,
 )
+from frf_ipz.quantities import RESPONSES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -33,7 +34,8 @@ if TYPE_CHECKING:
 CONTRADICTS = "contradicts the other impacts"
 OPPOSITE = "its sign is the opposite"
 UNNAMED = ""
-DISAGREE = 0.12  # of the FRF, 1 dB: two impacts that differ by more are no repetition
+ADVICE = "which is right does not show in two: drop the wrong one by [ingest] drop, or record a third"
+DISAGREE = 0.12  # of the FRF, 1 dB: two impacts that differ by more are no repetition; what is explained to this, is
 FEWEST_LINES = 64  # that are compared, however many impacts there are: a band of the scatter's fit
 
 
@@ -62,9 +64,11 @@ def compare_impacts(files: RecordingFiles, survey: Survey) -> tuple[tuple[Record
             continue
         spectra = _transform(files, survey, records)
         if len(records) == 2:
-            warnings += _warn_of_pair(files, records, spectra)
+            compared, undecided = _compare_pair(files, survey, records, spectra)
+            warnings += undecided
         else:
-            changed |= {record.name: record for record in _compare_setup(files, survey, records, spectra)}
+            compared = _compare_setup(files, survey, records, spectra)
+        changed |= {record.name: record for record in compared}
     return tuple(changed.get(record.name, record) for record in survey.records), tuple(warnings)
 
 
@@ -139,9 +143,11 @@ def _compare_output(
     comparison = compare_output(spectra, output)
     if comparison is None:
         return None
+    if len(comparison.agreeing) == FEWEST:
+        return _without_lost_of_three(files, survey, records, spectra, output, comparison)
     n_tried = int(spectra.valid.sum())
     for impact in comparison.agreeing:
-        if len(comparison.agreeing) <= FEWEST:
+        if len(comparison.agreeing) < FEWEST:
             break
         without = leave_out(spectra, output, comparison, impact)
         response, noise = spectra.responses[impact, output], spectra.noise[impact, output]
@@ -153,6 +159,25 @@ def _compare_output(
         if lost and without.explains(misfit, max(misfit * share, 1.0), n_tried):
             comparison = without
     return comparison
+
+
+def _without_lost_of_three(
+    files: RecordingFiles,
+    survey: Survey,
+    records: Sequence[RecordInfo],
+    spectra: ImpactSpectra,
+    output: int,
+    comparison: OutputComparison,
+) -> OutputComparison:
+    """Leave out of three impacts, two of which give no scatter to rely on, the one that lost samples, as in a pair."""
+    shares: list[tuple[float, int]] = []
+    for impact in comparison.agreeing:
+        others = [records[number] for number in comparison.agreeing if number != impact]
+        _, lost, share = _find_lost(files, survey, others, records[impact], output)
+        shares += [(share, impact)] if lost > 0 else []
+    if not shares or min(shares)[0] > DISAGREE**2:
+        return comparison
+    return leave_out(spectra, output, comparison, min(shares)[1])
 
 
 def _name_causes(
@@ -185,7 +210,7 @@ def _with_causes(record: RecordInfo, causes: Mapping[int, str], columns: Sequenc
     if len(said) == 1 and len(causes) > 1 and set(causes) == set(record.used_outputs):
         (text,) = said
         if text.startswith(CONTRADICTS):
-            text = text.replace(OPPOSITE, "all responses have the opposite sign, as if struck from the other side")
+            text = text.replace(OPPOSITE, "all responses have the opposite sign, as if struck from the other side", 1)
             return replace(record, faults=(*record.faults, text))
     faults = tuple(
         (output, text if "exchanged" in text else f"{columns[output]} {text}") for output, text in causes.items()
@@ -225,7 +250,7 @@ def _explain(
     force, response, noise = spectra.force[impact], spectra.responses[impact, output], spectra.noise[impact, output]
     misfit = comparison.misfit(force, response, noise)
     start, lost, share = lost_samples
-    if lost and comparison.explains(misfit, max(misfit * share, 1.0), 1):
+    if lost and (share <= DISAGREE**2 or comparison.explains(misfit, max(misfit * share, 1.0), 1)):
         what = f"{abs(lost)} samples {'are lost' if lost > 0 else 'came in'}"
         return f"{what} {start * survey.step_s:.4g} s after its beginning"
     expected = comparison.frf * force
@@ -254,24 +279,77 @@ def _find_lost(
     return find_lost_samples(signals[1 + output, :n], np.asarray(expected[:n]))
 
 
-def _warn_of_pair(files: RecordingFiles, records: Sequence[RecordInfo], spectra: ImpactSpectra) -> list[str]:
-    """Say where two impacts agree only with the opposite sign, or with two channels exchanged."""
+def _compare_pair(
+    files: RecordingFiles, survey: Survey, records: Sequence[RecordInfo], spectra: ImpactSpectra
+) -> tuple[list[RecordInfo], list[str]]:
+    """Compare two impacts: one of two that contradict each other is left out where an explanation names the fault.
+
+    The mean of two FRFs of opposite sign is noise, and that of two channels is no channel; one impact alone is right
+    but for what is said.
+    """
     columns = [channel.column for channel in files.test.output_channels]
     shared = [output for output in range(len(columns)) if spectra.valid[:, output].all()]
+    lost = _lost_of_pair(files, survey, records, shared)
+    if lost is not None:
+        impact, text = lost
+        fault = f"{CONTRADICTS}: {text}"
+        return [_with_causes(records[impact], dict.fromkeys(shared, fault), columns)], []
+    causes: dict[int, str] = {}
     opposite = [output for output in shared if contradicts_pairwise(spectra, output)]
-    names = " and ".join(record.name for record in records)
-    texts = []
-    if opposite:
-        texts.append(f"{' and '.join(columns[output] for output in opposite)} agree only with the opposite sign")
+    impact, reason = _wrong_of_pair(files, survey, records, spectra, opposite)
+    causes |= dict.fromkeys(opposite, f"{CONTRADICTS}: {OPPOSITE}, {reason}")
     for first, second in combinations([output for output in shared if output not in opposite], 2):
         exchanged = spectra.responses.copy()
         exchanged[0, [first, second]] = -exchanged[0, [second, first]]
         pair = replace(spectra, responses=exchanged)
         if contradicts_pairwise(pair, first) and contradicts_pairwise(pair, second):
-            texts.append(f"{columns[first]} and {columns[second]} agree only when exchanged")
-    if not texts:
-        differences = {columns[output]: difference_of_pair(spectra, output) for output in shared}
-        listed = ", ".join(f"{column} {100 * part:.0f} %" for column, part in differences.items() if part > DISAGREE)
-        texts += [f"their FRFs differ by {listed} (rms)"] if listed else []
-    advice = "which is right does not show in two: drop one by [ingest] drop, or record a third"
-    return [f"{names} contradict each other: {text}; {advice}" for text in texts]
+            names = f"{columns[first]} and {columns[second]}"
+            causes |= dict.fromkeys((first, second), f"{CONTRADICTS}: {names} are exchanged, {reason}")
+    if causes:
+        return [_with_causes(records[impact], causes, columns)], []
+    differences = {columns[output]: difference_of_pair(spectra, output) for output in shared}
+    listed = ", ".join(f"{column} {100 * part:.0f} %" for column, part in differences.items() if part > DISAGREE)
+    names = " and ".join(record.name for record in records)
+    text = f"{names} contradict each other: their FRFs differ by {listed} (rms); {ADVICE}"
+    return [], [text] if listed else []
+
+
+def _lost_of_pair(
+    files: RecordingFiles, survey: Survey, records: Sequence[RecordInfo], outputs: Sequence[int]
+) -> tuple[int, str] | None:
+    """Tell which of two impacts lost samples: allowed for in it, the two agree; the other way round they do not."""
+    found: list[tuple[float, int, int, int]] = []
+    for impact in (0, 1):
+        losses = [_find_lost(files, survey, [records[1 - impact]], records[impact], output) for output in outputs]
+        if losses and len({lost for _, lost, _ in losses}) == 1 and losses[0][1] > 0:
+            start, lost, _ = losses[0]
+            found.append((max(share for _, _, share in losses), impact, lost, start))
+    if not found or min(found)[0] > DISAGREE**2:
+        return None
+    _, impact, lost, start = min(found)
+    return impact, f"{lost} samples are lost {start * survey.step_s:.4g} s after its beginning"
+
+
+def _wrong_of_pair(
+    files: RecordingFiles,
+    survey: Survey,
+    records: Sequence[RecordInfo],
+    spectra: ImpactSpectra,
+    opposite: Sequence[int],
+) -> tuple[int, str]:
+    """Tell which of two impacts is wrong, and by what: the force's sign, power at the driving point, or nothing."""
+    signs = [np.sign(record.peak_force) for record in records]
+    usual = np.sign(sum(np.sign(record.peak_force) for record in survey.used if record.setup != records[0].setup))
+    if signs[0] != signs[1] and usual:
+        return signs.index(-usual), "and that of its force too, against the impacts at other points"
+    setup = records[0].setup
+    for output in opposite:
+        if setup.output_dofs[output].unsigned != setup.input_dof.unsigned:
+            continue
+        channel = files.test.output_channels[output]
+        turn = (-1j) ** (RESPONSES.index(channel.quantity) - 1)  # from the response to the velocity
+        turn *= setup.output_dofs[output].sign * setup.input_dof.sign
+        power = np.sum(spectra.force.conj() * spectra.responses[:, output] * turn, axis=1).real
+        if power.min() < 0.0 < power.max():
+            return int(np.argmin(power)), f"and {channel.column}, at the point of the force, would give power to it"
+    return 1, f"and {ADVICE}; without that, {records[0].name} is used"
