@@ -235,7 +235,7 @@ def test_the_distance_to_the_optimum_is_in_posterior_deviations(problem):
     def distance(whitened):
         return distance_to_optimum(linear, step, scales, 0.0, whitened, data - sensitivity @ whitened)
 
-    assert distance(mean) < 1e-9
+    assert distance(mean) < 1e-7  # the root of a sum that is rounding
     assert_allclose(distance(mean + change), np.sqrt(change @ np.linalg.solve(covariance, change)), rtol=1e-9)
 
 
