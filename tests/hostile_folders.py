@@ -318,7 +318,7 @@ for _stage, _name, _change in [
     (
         "diagnose",
         "has_lists_for_names",
-        lambda fields, _: fields.update(mismatch_location={"dict": [["nodes", [[[]]]]]}),
+        lambda fields, _: fields.update(mismatch_location={"fields": {"nodes": [[]]}}),
     ),
     ("levels", "has_another_table", lambda fields, _: fields.update(modes={"frame": [["a", ["b"]]], "rows": 1})),
 ]:

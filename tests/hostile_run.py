@@ -90,7 +90,7 @@ def _diagnosis(diagnosis):
             finding,
             effect=hostile(finding.effect),
             statement=hostile(finding.statement),
-            location={**finding.location, HOSTILE: (HOSTILE,)},
+            location=replace(finding.location, channels=(HOSTILE,), groups=(HOSTILE,)),
             parameters={**finding.parameters, HOSTILE: HOSTILE},
         )
         for finding in diagnosis.findings

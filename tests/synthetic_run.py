@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.measured.levels import COLUMNS, LevelDependence
 from frf_ipz.diagnosis.result import (
     Ambiguity,
@@ -327,7 +328,7 @@ def synthetic_diagnosis(labels, nodes):
     ]
     mass = Finding(
         effect="added_mass",
-        location={"nodes": (nodes[1],)},
+        location=Location.at_node(nodes[1]),
         parameters={"mass_kg": Estimate(value=0.0123, std=0.0004, low=0.0115, high=0.0131)},
         probability=0.98,
         log_evidence_gain=812.4,
@@ -335,7 +336,7 @@ def synthetic_diagnosis(labels, nodes):
     )
     gain = Finding(
         effect="sensor_gain",
-        location={"channels": (labels[0].output_channel,)},
+        location=Location.on_channel(labels[0].output_channel),
         parameters={"gain_ratio": Estimate(value=-1.0, std=0.01, low=-1.02, high=-0.98)},
         probability=0.9995,
         log_evidence_gain=99.0,

@@ -7,7 +7,6 @@ from .assessment.deviations import FrfDeviation as FrfDeviation
 from .diagnosis.apply import correct_frfs as correct_frfs
 from .diagnosis.apply import correct_model as correct_model
 from .diagnosis.catalogue.effect import Effect as Effect
-from .diagnosis.catalogue.effect import Location as Location
 from .diagnosis.catalogue.effect import Parameter as Parameter
 from .diagnosis.catalogue.effect import Signature as Signature
 from .diagnosis.catalogue.model_context import ModelContext as ModelContext
@@ -16,6 +15,7 @@ from .diagnosis.compare.compare import compare_states as compare_states
 from .diagnosis.compare.states import CompareOptions as CompareOptions
 from .diagnosis.compare.states import MachineState as MachineState
 from .diagnosis.diagnose import diagnose as diagnose
+from .diagnosis.location import Location as Location
 from .diagnosis.model.change import Change as Change
 from .diagnosis.nonlinear.laws.law import Law as Law
 from .diagnosis.observations import Observations as Observations

@@ -9,7 +9,6 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arguments import require_type
-from frf_ipz.diagnosis.catalogue.effect import Location
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.joint_change import build_together
 from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from frf_ipz.diagnosis.catalogue.effect import Effect
-    from frf_ipz.diagnosis.result import Curves, Finding, LinearisedLaw
+    from frf_ipz.diagnosis.result import Curves, LinearisedLaw
     from frf_ipz.frf import FrfLabel
 
 
@@ -96,12 +95,12 @@ def prepare_correction(
     structural = {
         number: known[finding.effect]
         for number, finding in enumerate(diagnosis.findings)
-        if finding.effect in known and known[finding.effect].chain(_location_of(finding)) is None
+        if finding.effect in known and known[finding.effect].chain(finding.location) is None
     }
     if not structural or diagnosis.curves is None:
         return lambda _: base
     context = _model_context(base, diagnosis.curves)
-    acting = [(effect, _location_of(diagnosis.findings[number])) for number, effect in structural.items()]
+    acting = [(effect, diagnosis.findings[number].location) for number, effect in structural.items()]
     builders = dict(zip(structural, build_together(context, acting), strict=True))
 
     def correct(values: Sequence[Sequence[float]]) -> StructuralModel:
@@ -203,15 +202,10 @@ def _chain_change(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Change:
     """Everything that the findings change in the measuring chain."""
     total = NO_CHANGE
     for finding in diagnosis.findings:
-        build = known[finding.effect].chain(_location_of(finding)) if finding.effect in known else None
+        build = known[finding.effect].chain(finding.location) if finding.effect in known else None
         if build is not None:
             total = total + build(np.array(finding.values))
     return total
-
-
-def _location_of(finding: Finding) -> Location:
-    text = {name: value for name, value in finding.parameters.items() if isinstance(value, str)}
-    return Location(key=finding.key, entries=finding.location, text=text)
 
 
 def _channel_names(label: FrfLabel) -> tuple[str, str]:

@@ -17,6 +17,7 @@ from frf_ipz.diagnosis.catalogue.effect import Effect
 from frf_ipz.diagnosis.deadline import NO_LIMIT, Deadline, DeadlineError
 from frf_ipz.diagnosis.effect_selection import EffectCatalogue
 from frf_ipz.diagnosis.evidence.inference_problem import make_data, pose_problem
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.measured.group_spectra import group_records
 from frf_ipz.diagnosis.measured.preprocessing.dc_offset import remove_dc_offset
@@ -505,7 +506,7 @@ def _add_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
         before=before,
         updated=updated,
         after=after if n_findings else updated,
-        mismatch_location=laws.location or (findings[0].location if n_findings else {}),
+        mismatch_location=laws.location or (findings[0].location if n_findings else Location()),
         ambiguity=(),
         statement=laws.statement if linearised is None else f"{laws.statement} {linearised.statement}",
         linearised_law=linearised,
@@ -514,15 +515,13 @@ def _add_law(linear: Diagnosis, laws: LawSearch) -> Diagnosis:
     )
 
 
-def _locate_mismatch(
-    problem: InferenceProblem, decision: Decision, findings: tuple[Finding, ...]
-) -> Mapping[str, object]:
+def _locate_mismatch(problem: InferenceProblem, decision: Decision, findings: tuple[Finding, ...]) -> Location:
     """Locate what was found, or what remains unexplained."""
     if decision.unnamed_force is not None:
-        return decision.unnamed_force.hypothesis.components[-1].location.entries
+        return decision.unnamed_force.hypothesis.components[-1].location
     if decision.verdict == DiagnosisVerdict.UNEXPLAINED:
         return localise_mismatch(problem, decision.null)
-    return findings[0].location if findings else {}
+    return findings[0].location if findings else Location()
 
 
 def _select_identifiable(effects: dict[str, Effect], scale: str) -> dict[str, Effect]:
@@ -550,7 +549,7 @@ def _make_findings(
             min(newest.probability, probability_of_need(gain, scale)),
             gain,
             scale,
-            location_set=(dict(components[number].location.entries),),
+            location_set=(components[number].location.place,),
         )
         for number in range(len(components) - 1)
         for gain in [log_bayes_factor(decision.final, fit_without_component(problem, decision.final, number))]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.display import Concise, Drawn, Tabulated
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel
@@ -148,8 +149,8 @@ class Finding:
     ----------
     effect : str
         Name in the catalogue.
-    location : mapping
-        What applies of ``nodes``, ``elements``, ``springs``, ``channels``, ``end``, ``groups``, as in `diagnosis.json`.
+    location : Location
+        As a mapping: what applies of ``nodes``, ``elements``, ``springs``, ``channels``, ``end``, ``groups``.
     parameters : mapping of str to Estimate or str
         By their names in the contract.
     probability : float
@@ -158,12 +159,10 @@ class Finding:
         Log Bayes factor (natural) over the explanation without this effect.
     statement : str
         A sentence for the user.
-    location_set : tuple of mapping
+    location_set : tuple of Location
         All locations that hold 95 % of the effect's probability, the most probable first.
     is_significant : bool
         False where it was detected and lies within the user's tolerances.
-    key : tuple
-        The location as the effect itself knows it.
     values : tuple of float
         Values of the parameters as the effect itself knows them, in its own order.
 
@@ -187,19 +186,18 @@ class Finding:
     >>> options = frf_ipz.DiagnoseOptions(effects=("added_mass",))
     >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
     >>> finding = diagnosis.findings[0]
-    >>> finding.effect, finding.location, finding.is_significant
+    >>> finding.effect, dict(finding.location), finding.is_significant
     ('added_mass', {'nodes': [3]}, True)
     """
 
     effect: str
-    location: Mapping[str, object] = field(default_factory=dict)
+    location: Location = field(default_factory=Location)
     parameters: Mapping[str, Estimate | str] = field(default_factory=dict)
     probability: float = 1.0
     log_evidence_gain: float = 0.0
     statement: str = ""
-    location_set: tuple[Mapping[str, object], ...] = ()
+    location_set: tuple[Location, ...] = ()
     is_significant: bool = True
-    key: tuple[object, ...] = ()
     values: tuple[float, ...] = ()
 
     @property
@@ -283,13 +281,13 @@ PROBABILITY = re.compile(r"\((probability [^()]*)\)")
 APPEARANCE = "A part of it looks like this, and need not be: "
 
 
-def describe_location_set(locations: Sequence[Mapping[str, object]]) -> str:
+def describe_location_set(locations: Sequence[Location]) -> str:
     """Name the locations between which a test cannot decide.
 
     Parameters
     ----------
-    locations : sequence of mapping
-        Locations as in `diagnosis.json`, the most probable first.
+    locations : sequence of Location
+        The most probable first.
 
     Returns
     -------
@@ -304,7 +302,7 @@ def describe_location_set(locations: Sequence[Mapping[str, object]]) -> str:
             item for item in location.items() if any(alternative.get(item[0]) != item[1] for alternative in locations)
         ]
         for kind, value in distinct[:1]:
-            kinds.setdefault(kind, []).append(tuple(value) if isinstance(value, list | tuple) else (value,))
+            kinds.setdefault(kind, []).append(tuple(value) if isinstance(value, list) else (value,))
     words = " or ".join(f"{kind} {_list_values(kind, parts)}" for kind, parts in kinds.items())
     return f" The test locates it no closer than {words}."
 
@@ -581,7 +579,7 @@ class Diagnosis(Tabulated, Drawn):
         Frequencies at which the nominal model disagrees with the measurement, Hz.
     mismatch_where : str
         Which FRFs, bands and DOFs disagree, and by how much.
-    mismatch_location : mapping
+    mismatch_location : Location
         Where it sits: of the first finding, or where one unknown dynamic stiffness explains most of it; may be empty.
     mismatch : DataFrame
         One row an FRF and band: ``frf``, ``low_hz``, ``high_hz``, ``before``, ``after``: rms misfit over what noise and
@@ -636,7 +634,7 @@ class Diagnosis(Tabulated, Drawn):
     >>> diagnosis = frf_ipz.diagnose(frfs, model, options=options)
     >>> diagnosis
     Diagnosis: explained, added_mass
-    >>> [(finding.effect, finding.location) for finding in diagnosis.findings]
+    >>> [(finding.effect, dict(finding.location)) for finding in diagnosis.findings]
     [('added_mass', {'nodes': [3]})]
     """
 
@@ -650,7 +648,7 @@ class Diagnosis(Tabulated, Drawn):
     updated: Misfit
     after: Misfit
     held_out_kind: str
-    mismatch_location: Mapping[str, object] = field(default_factory=dict)
+    mismatch_location: Location = field(default_factory=Location)
     ambiguity: tuple[Ambiguity, ...] = ()
     data_checks: tuple[DataCheck, ...] = ()
     detectability: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -701,7 +699,7 @@ class Diagnosis(Tabulated, Drawn):
             "mismatch": {
                 "frequency_hz": [round(float(value), 6) for value in self.mismatch_hz],
                 "where": self.mismatch_where,
-                "location": _location_to_json(self.mismatch_location),
+                "location": dict(self.mismatch_location),
             },
             "fit": {
                 "before": _misfit_to_json(self.before),
@@ -799,12 +797,12 @@ JSON_KEYS = {
 def _finding_to_json(finding: Finding) -> dict[str, Any]:
     return {
         "effect": finding.effect,
-        "location": _location_to_json(finding.location),
+        "location": dict(finding.location),
         "parameters": {name: _parameter_to_json(value) for name, value in finding.parameters.items()},
         "probability": _plain_number(finding.probability),
         "log_evidence_gain": _plain_number(finding.log_evidence_gain),
         "statement": finding.statement,
-        "location_set": [_location_to_json(location) for location in finding.location_set],
+        "location_set": [dict(location) for location in finding.location_set],
         "significant": finding.is_significant,
     }
 
@@ -818,10 +816,6 @@ def _law_to_json(law: LinearisedLaw) -> dict[str, Any]:
         "stiffness_at_N_m": [_plain_number(value) for value in law.stiffness_by_record],
         "damping_at_Ns_m": [_plain_number(value) for value in law.damping_by_record],
     }
-
-
-def _location_to_json(location: Mapping[str, object]) -> dict[str, object]:
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in location.items()}
 
 
 def _parameter_to_json(value: Estimate | str) -> Any:  # noqa: ANN401 - a text, or numbers by name

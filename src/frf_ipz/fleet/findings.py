@@ -23,6 +23,7 @@ from frf_ipz.fleet.outliers import find_outliers
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from frf_ipz.diagnosis.location import Location
     from frf_ipz.fleet.machine_record import MachineRecord
 
 OWN_SIZE = 0.05  # probability that the size of a common fault is said to be one machine's own where it is not
@@ -183,5 +184,5 @@ def _size(finding: Finding) -> tuple[str, float, float]:
     return "", float("nan"), float("nan")
 
 
-def _text(location: Mapping[str, object]) -> str:
-    return json.dumps({name: list(value) if isinstance(value, tuple) else value for name, value in location.items()})
+def _text(location: Location) -> str:
+    return json.dumps(dict(location))

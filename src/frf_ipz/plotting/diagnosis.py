@@ -11,8 +11,6 @@ from frf_ipz.plotting.picture import Axis, Bars, HeatMap, Layer, Line, Panel, Pi
 from frf_ipz.plotting.wording import counted, number, percent
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from frf_ipz.diagnosis.result import Curves, Diagnosis, Finding, Misfit
 
 MOST_ALTERNATIVES = 15
@@ -120,7 +118,7 @@ def describe_ranking(diagnosis: Diagnosis) -> Picture | None:
     if not len(ranked) or gains.max() <= 0:
         return None
     names = [
-        f"{rank}. {effect_name(finding.effect)} {location_text(finding.location)}".strip()
+        f"{rank}. {effect_name(finding.effect)} {finding.location.text}".strip()
         for rank, finding in enumerate(ranked, start=1)
     ]
     is_close = len(gains) > 1 and gains.min() > CLOSE * gains.max()
@@ -174,26 +172,6 @@ def effect_name(effect: str) -> str:
         For example ``added mass``.
     """
     return effect.replace("_", " ")
-
-
-def location_text(location: Mapping[str, object]) -> str:
-    """Name the location of a finding for people.
-
-    Parameters
-    ----------
-    location : mapping
-        Of the finding.
-
-    Returns
-    -------
-    str
-        For example ``nodes 3, 4``.
-    """
-    texts = []
-    for name, value in location.items():
-        items = ", ".join(str(item) for item in value) if isinstance(value, tuple | list) else str(value)
-        texts.append(f"{name} {items}")
-    return "; ".join(texts)
 
 
 def probability_text(finding: Finding) -> str:

@@ -16,6 +16,7 @@ from frf_ipz.plotting.wording import listed, number
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from frf_ipz.diagnosis.location import Location
     from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfSet
@@ -163,20 +164,14 @@ def mismatch_nodes(diagnosis: Diagnosis | None, frfs: FrfSet | None) -> dict[int
     return dict.fromkeys(_nodes_of(diagnosis.mismatch_location, frfs), text)
 
 
-def _nodes_of(location: Mapping[str, object], frfs: FrfSet | None) -> list[int]:
-    nodes, elements = _numbers(location.get("nodes")), _numbers(location.get("elements"))
-    if elements:
-        nodes += list(range(elements[0], elements[-1] + 2))
-    named = location.get("channels")
-    channels = set(named) if isinstance(named, tuple | list) else set()
+def _nodes_of(location: Location, frfs: FrfSet | None) -> list[int]:
+    nodes = list(location.nodes)
+    if location.elements:
+        nodes += range(location.elements[0], location.elements[-1] + 2)
     for label in () if frfs is None or nodes else frfs.labels:
         ends = ((label.output_dof, label.output_channel), (label.input_dof, label.input_channel))
-        nodes += [dof.node for dof in node_dofs(dof for dof, channel in ends if channel in channels)]
+        nodes += [dof.node for dof in node_dofs(dof for dof, channel in ends if channel in location.channels)]
     return nodes
-
-
-def _numbers(value: object) -> list[int]:
-    return [int(item) for item in value] if isinstance(value, tuple | list) else []
 
 
 def _plan(geometry: Geometry | None, marks: StructureMarks) -> tuple[IntArray, FloatArray, IntArray]:

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 from frf_ipz.diagnosis.result import confidence
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from frf_ipz.diagnosis.result import Diagnosis
 
 ROUNDED = re.compile(r"\b\d(?:\.\d+)?e\+0[1-5]\b")  # rounded to few digits, and short when written out
@@ -60,8 +58,7 @@ def mismatch_sentence(diagnosis: Diagnosis) -> list[str]:
     """
     if diagnosis.is_explained or not diagnosis.mismatch_location:
         return []
-    named = [f"{key.removesuffix('s')} {items}" for key, items in _in_words(diagnosis.mismatch_location)]
-    return [f"An unknown force at {' and '.join(named)} would explain most of the mismatch."]
+    return [f"An unknown force at {diagnosis.mismatch_location.words} would explain most of the mismatch."]
 
 
 def typeset(text: str) -> str:
@@ -105,10 +102,3 @@ def card_texts(diagnosis: Diagnosis) -> tuple[str, str]:
             "but damping, which is as measured" if diagnosis.statements else "within the stated tolerances",
         )
     return names, confidence(min(finding.probability for finding in diagnosis.findings))
-
-
-def _in_words(location: Mapping[str, object]) -> list[tuple[str, str]]:
-    return [
-        (key, ", ".join(map(str, value)) if isinstance(value, tuple | list) else str(value))
-        for key, value in location.items()
-    ]

@@ -260,11 +260,11 @@ def weigh_changes(comparison: frf_ipz.Comparison, pieces: Sequence[int]) -> list
     problem = pose_state_problem(comparison.expected, split_data(comparison.expected.observed), comparison.scatter)
     null, mass_loss, shipped = fit_null_model(problem), MassLoss(), shipped_effects()
     changes: dict[str, tuple[frf_ipz.Effect, frf_ipz.Location]] = {
-        f"piece {number} lost mass": (mass_loss, frf_ipz.Location(key=(node, "z"), entries={"nodes": [node]}))
+        f"piece {number} lost mass": (mass_loss, frf_ipz.Location.at_node(node, "z"))
         for number, node in enumerate(pieces, start=1)
     }
     changes |= {
-        " ".join([name, *map(str, location.key)]): (shipped[name], location)
+        " ".join([name, location.text, *location.directions]): (shipped[name], location)
         for name in WEIGHED
         for location in shipped[name].locations(problem.context)
     }

@@ -12,6 +12,7 @@ from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.diagnose import SEED_WARNING, diagnose
 from frf_ipz.diagnosis.evidence.hypothesis import Component
 from frf_ipz.diagnosis.evidence.inference_problem import pose_problem
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.result import Finding
@@ -157,7 +158,7 @@ def test_a_channel_of_the_wrong_sign_is_found_and_put_right(nominal):
 def test_a_line_that_a_highpass_does_not_show_stays_as_it_is(nominal, with_mass):
     frfs = measured(nominal)
     from_zero = replace(frfs, frequency_hz=frfs.frequency_hz - frfs.frequency_hz[0])
-    highpass = Finding(effect="sensor_dynamics", key=("acc_2", "highpass"), values=(20.0,))
+    highpass = Finding(effect="sensor_dynamics", location=Location.on_channel("acc_2", form="highpass"), values=(20.0,))
     right = correct_frfs(from_zero, replace(with_mass, findings=(highpass,)))
     s = from_zero.s[1:]
     assert np.array_equal(right.values[0], from_zero.values[0])
@@ -176,9 +177,7 @@ def test_noise_is_not_taken_for_a_gain(nominal):
     problem = pose_problem(nominal, source, BAND_HZ, FEW, shipped_effects())
     effect = problem.effects["sensor_gain"]
     locations = effect.locations(problem.context)
-    force = Component(
-        effect=effect, location=locations[[location.key for location in locations].index(("force", 1))], n_locations=1
-    )
+    force = Component(effect=effect, location=locations[locations.index(Location.on_channel("force"))], n_locations=1)
     fit = problem.fit((force,), np.array([1.01]))
     assert fit.values[0] == pytest.approx(1.0, abs=GAIN)
     assert fit.log_evidence < problem.fit((), np.zeros(0)).log_evidence
@@ -214,13 +213,14 @@ def test_a_users_own_effect_is_found(nominal, tmp_path):
 OWN = """
 import numpy as np
 from scipy import sparse
-from frf_ipz.diagnosis.catalogue.effect import Effect, Location, Parameter
+from frf_ipz.diagnosis.catalogue.effect import Effect, Parameter
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 
 class Cord(Effect):
     name = "cord"
     def locations(self, context):
-        return [Location(key=(14,), entries={"nodes": [14]})]
+        return [Location.at_node(14)]
     def parameters(self, context, location):
         return (Parameter(name="pull_N_m", low=10.0, high=1e6),)
     def build(self, context, location):

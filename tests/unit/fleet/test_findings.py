@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.result import Estimate, Finding
 from frf_ipz.fleet.findings import add_up_findings
 from frf_ipz.fleet.machine_record import MachineRecord
@@ -11,8 +12,8 @@ from frf_ipz.fleet.machine_record import MachineRecord
 def mass(node, kg, *, gain=15.0, also=()):
     return Finding(
         effect="added_mass",
-        location={"nodes": [node]},
-        location_set=tuple({"nodes": [other]} for other in (node, *also)),
+        location=Location.at_node(node),
+        location_set=tuple(Location.at_node(other) for other in (node, *also)),
         parameters={"mass_kg": Estimate(value=kg, std=0.01, low=kg - 0.02, high=kg + 0.02)},
         probability=0.99,
         log_evidence_gain=gain,
@@ -22,7 +23,7 @@ def mass(node, kg, *, gain=15.0, also=()):
 def spring(node):
     return Finding(
         effect="grounded_spring",
-        location={"nodes": [node]},
+        location=Location.at_node(node),
         parameters={"stiffness_N_m": Estimate(value=1e4, std=100.0, low=9.8e3, high=1.02e4)},
         log_evidence_gain=30.0,
     )

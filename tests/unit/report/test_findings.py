@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.result import Ambiguity, as_appearance
 from frf_ipz.plotting.structure import finding_nodes, mismatch_nodes
 from frf_ipz.report.findings import card_texts, typeset, verdict_of
@@ -77,7 +78,7 @@ def test_places_of_findings_are_marked_on_the_structure(run):
 
 
 def test_the_location_of_an_unexplained_mismatch_is_stated_and_marked(run):
-    diagnosis = replace(run.diagnosis, verdict="unexplained", findings=(), mismatch_location={"nodes": [4]})
+    diagnosis = replace(run.diagnosis, verdict="unexplained", findings=(), mismatch_location=Location.at_node(4))
     sentence = "An unknown force at node 4 would explain most of the mismatch."
     assert verdict_of(diagnosis)[1] == sentence
     assert sentence in build(with_results(run, diagnosis=diagnosis)).notes
@@ -90,7 +91,7 @@ def test_the_location_of_an_unexplained_mismatch_is_stated_and_marked(run):
     np.testing.assert_array_equal(ring.x, at)
 
 
-@pytest.mark.parametrize(("verdict", "location"), [("explained", {"nodes": [4]}), ("unexplained", {})])
+@pytest.mark.parametrize(("verdict", "location"), [("explained", Location.at_node(4)), ("unexplained", Location())])
 def test_no_place_is_marked_where_there_is_none(run, verdict, location):
     diagnosis = replace(run.diagnosis, verdict=verdict, mismatch_location=location)
     assert mismatch_nodes(diagnosis, run.frfs) == {}
@@ -98,7 +99,7 @@ def test_no_place_is_marked_where_there_is_none(run, verdict, location):
 
 
 def test_elements_are_marked_at_all_their_nodes(run):
-    finding = replace(run.diagnosis.findings[0], location={"elements": (3, 5)})
+    finding = replace(run.diagnosis.findings[0], location=Location(elements=(3, 5)))
     assert sorted(finding_nodes(replace(run.diagnosis, findings=(finding,)), run.frfs)) == [3, 4, 5, 6]
 
 

@@ -21,13 +21,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.motion import Motion
 
 if TYPE_CHECKING:
@@ -77,31 +78,6 @@ class Parameter:
             return 0.3 * self.high
         middle = float(np.sqrt(self.low * self.high))
         return middle if not np.isclose(middle, self.neutral, rtol=0.05) else 1.3 * middle
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Location:
-    """Somewhere an effect could sit.
-
-    Parameters
-    ----------
-    key : tuple
-        Distinguishes it from other locations of the same effect.
-    entries : mapping
-        What `diagnosis.json` says of it: nodes, elements, springs, channels, an end, groups.
-    text : mapping of str to str
-        Parameters that are text: the kind of a filter.
-
-    Examples
-    --------
-    >>> import frf_ipz
-    >>> frf_ipz.Location(key=(3, "x"), entries={"nodes": [3]}).entries
-    {'nodes': [3]}
-    """
-
-    key: tuple[object, ...]
-    entries: Mapping[str, object] = field(default_factory=dict)
-    text: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -162,17 +138,17 @@ class Effect(ABC):
     >>> class Ballast(frf_ipz.Effect):
     ...     name = "ballast"
     ...     def locations(self, context):
-    ...         return [frf_ipz.Location(key=(dof.node,), entries={"nodes": [dof.node]}) for dof in context.moving_dofs]
+    ...         return [frf_ipz.Location.at_node(dof.node) for dof in context.moving_dofs]
     ...     def parameters(self, context, location):
     ...         return (frf_ipz.Parameter(name="mass_kg", low=1e-3, high=1.0),)
     ...     def build(self, context, location):
     ...         matrix = context.model.mass_all * 0
-    ...         row = context.model.full_index(frf_ipz.Dof(location.key[0], "x"))
+    ...         row = context.model.full_index(frf_ipz.Dof(location.node, "x"))
     ...         unit = matrix.tolil()
     ...         unit[row, row] = 1.0
     ...         return lambda values: frf_ipz.Change(mass=values[0] * unit.tocsr())
     ...     def statement(self, context, location, values):
-    ...         return f"Ballast of {values['mass_kg'].value:.3g} kg at node {location.key[0]}."
+    ...         return f"Ballast of {values['mass_kg'].value:.3g} kg at node {location.node}."
     >>> import numpy as np
     >>> stiffness = 1e5 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
     >>> dofs = ["1:x", "2:x", "3:x"]
@@ -246,6 +222,11 @@ class Effect(ABC):
         del values
         return ""
 
+    def texts(self, location: Location) -> Mapping[str, str]:
+        """Give parameters that are text: the kind of a filter."""
+        del location
+        return {}
+
     def report_value(self, location: Location, name: str, value: float) -> float:
         """Turn a value that was searched into the one that is reported: a sign, for one."""
         del location, name
@@ -297,9 +278,9 @@ def list_node_locations(context: ModelContext) -> list[Location]:
     Returns
     -------
     list of Location
-        Keys are node and direction.
+        By node.
     """
-    return [Location(key=(dof.node, dof.direction), entries={"nodes": [dof.node]}) for dof in context.moving_dofs]
+    return [Location.at_node(dof.node, dof.direction) for dof in context.moving_dofs]
 
 
 def list_neighbouring_nodes(context: ModelContext, location: Location) -> list[Location]:
@@ -310,15 +291,12 @@ def list_neighbouring_nodes(context: ModelContext, location: Location) -> list[L
     context : ModelContext
         Model, layout and tolerances.
     location : Location
-        A location of `list_node_locations`.
+        At a node, in a direction.
 
     Returns
     -------
     list of Location
-        The nearest ones.
+        The nearest ones, the same but for the node.
     """
-    node, direction = location.key
-    return [
-        Location(key=(neighbour, direction), entries={"nodes": [neighbour]})
-        for neighbour in context.neighbouring_nodes(int(str(node)), str(direction))
-    ]
+    beside = context.neighbouring_nodes(location.node, location.direction)
+    return [replace(location, nodes=(node,)) for node in beside]

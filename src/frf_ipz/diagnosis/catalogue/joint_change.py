@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location
+    from frf_ipz.diagnosis.catalogue.effect import Builder, Effect
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+    from frf_ipz.diagnosis.location import Location
     from frf_ipz.diagnosis.model.change import Change
 
 

@@ -16,8 +16,9 @@ from frf_ipz.dofs import Dof
 from frf_ipz.fe.assembly import multiply
 
 if TYPE_CHECKING:
+    from frf_ipz.diagnosis.location import Location
     from frf_ipz.diagnosis.model.basis import Basis
-    from frf_ipz.structure import StructuralModel
+    from frf_ipz.structure import Part, StructuralModel
 
 NEAREST = 8  # nodes that count as neighbours where nodes are not in a row
 
@@ -45,13 +46,13 @@ class ModelContext:
     >>> class Ballast(frf_ipz.Effect):
     ...     name = "ballast"
     ...     def locations(self, context: frf_ipz.ModelContext):
-    ...         return [frf_ipz.Location(key=(dof.node,)) for dof in context.moving_dofs]
+    ...         return [frf_ipz.Location.at_node(dof.node) for dof in context.moving_dofs]
     ...     def parameters(self, context: frf_ipz.ModelContext, location):
     ...         return (frf_ipz.Parameter(name="mass_kg", low=1e-3 * context.mass_kg, high=context.mass_kg),)
     ...     def build(self, context, location):
     ...         return lambda values: frf_ipz.Change(mass=values[0] * context.model.mass_all)
     ...     def statement(self, context, location, values):
-    ...         return f"Ballast at {context.describe_node(location.key[0])}."
+    ...         return f"Ballast at {context.describe_node(location.node)}."
     >>> Ballast().name
     'ballast'
     """
@@ -108,9 +109,13 @@ class ModelContext:
         """Motion of one DOF, by index."""
         return Motion(rows=(self.model.full_index(dof),), weights=(1.0,))
 
-    def motion_at(self, node: object, direction: object) -> Motion:
-        """Motion of one DOF, by index, as the key of a location names it."""
-        return self.motion(Dof(int(str(node)), str(direction)))
+    def spring_at(self, location: Location) -> Part:
+        """Find the spring of the model that a location names."""
+        return next(part for part in self.model.parts if part.kind == "spring" and part.name in location.springs)
+
+    def extension(self, spring: Part) -> Motion:
+        """Motion of the second end of a spring against its first."""
+        return Motion(rows=tuple(spring.indices.tolist()), weights=(-1.0, 1.0))
 
     def stiffness_against(self, motion: FloatArray | Motion) -> float:
         """Stiffness against a motion by the elastic modes near the band, N/m; N m/rad against a rotation."""

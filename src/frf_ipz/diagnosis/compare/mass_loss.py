@@ -11,12 +11,12 @@ from scipy.sparse.linalg import splu
 from frf_ipz.diagnosis.catalogue.effect import (
     Builder,
     Effect,
-    Location,
     Parameter,
     Signature,
     list_neighbouring_nodes,
     list_node_locations,
 )
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.fe.changes import with_point_masses
 
@@ -39,31 +39,26 @@ class MassLoss(Effect):
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that has something to lose."""
         least = MIN_MASS * context.mass_kg
-        first = {location.key[0]: location for location in reversed(list_node_locations(context))}
-        masses = _removable_masses(context.model, [str(location.key[1]) for location in first.values()], list(first))
-        return [
-            location
-            for location, mass in sorted(zip(first.values(), masses, strict=True), key=_by_node)
-            if mass > least
-        ]
+        first = sorted({location.node: location for location in reversed(list_node_locations(context))}.values())
+        masses = _removable_masses(context.model, first)
+        return [location for location, mass in zip(first, masses, strict=True) if mass > least]
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Mass, at most what the node has."""
-        (removable,) = _removable_masses(context.model, [str(location.key[1])], [location.key[0]])
+        (removable,) = _removable_masses(context.model, [location])
         return (Parameter(name="mass_kg", low=SMALLEST * context.mass_kg, high=MAX_PART * removable),)
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Less mass in all translational directions of the node."""
         model = context.model
-        unit = with_point_masses(model, {int(str(location.key[0])): 1.0}).mass_all - model.mass_all
+        unit = with_point_masses(model, {location.node: 1.0}).mass_all - model.mass_all
         return lambda values: Change(mass=-values[0] * unit)
 
     def signature(self, context: ModelContext, location: Location) -> Signature:
         """-s^2 m against the direction of the test."""
-        node, direction = location.key
         (parameter,) = self.parameters(context, location)
         return Signature(
-            motion=context.motion_at(node, direction),
+            motion=context.motion(location.dof),
             shapes=-(context.contour[None] ** 2),
             values=np.ones((1, 1)),
             amplitudes=np.geomspace(0.05, 1.0, 8) * parameter.high,
@@ -71,29 +66,24 @@ class MassLoss(Effect):
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside that have something to lose."""
-        known = {candidate.key for candidate in self.locations(context)}
-        return [candidate for candidate in list_neighbouring_nodes(context, location) if candidate.key in known]
+        known = set(self.locations(context))
+        return [candidate for candidate in list_neighbouring_nodes(context, location) if candidate in known]
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how much is gone from where."""
         mass = values["mass_kg"]
         return (
             f"A mass of {1e3 * mass.value:.3g} g (+- {1e3 * mass.std:.2g} g) is gone from "
-            f"{context.describe_node(int(str(location.key[0])))}."
+            f"{context.describe_node(location.node)}."
         )
 
 
-def _by_node(entry: tuple[Location, float]) -> int:
-    return int(str(entry[0].key[0]))
-
-
-def _removable_masses(model: StructuralModel, directions: Sequence[str], nodes: Sequence[object]) -> list[float]:
+def _removable_masses(model: StructuralModel, locations: Sequence[Location]) -> list[float]:
     """Largest masses that could be taken from nodes with the mass matrix still positive, ``1 / (M^-1)_uu``, kg."""
     free = np.flatnonzero(~model.fixed)
     free_index = {int(row): index for index, row in enumerate(free)}
-    rows = {(dof.node, dof.direction): free_index[row] for dof, row in model.full_indices.items() if row in free_index}
-    loads = np.zeros((len(free), len(nodes)))
-    required_rows = [rows[int(str(node)), direction] for node, direction in zip(nodes, directions, strict=True)]
+    required_rows = [free_index[model.full_index(location.dof)] for location in locations]
+    loads = np.zeros((len(free), len(locations)))
     loads[required_rows, np.arange(len(required_rows))] = 1.0
     try:
         solved = splu(model.mass.tocsc()).solve(loads)

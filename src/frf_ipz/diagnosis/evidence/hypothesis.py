@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -23,10 +23,12 @@ from frf_ipz.diagnosis.model.nuisance import NuisancePrior
 from frf_ipz.diagnosis.model.response import Response, respond
 
 if TYPE_CHECKING:
-    from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
+    from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
+    from frf_ipz.diagnosis.location import Location
 
 
+ComponentKey: TypeAlias = "tuple[str, Location]"
 N_REMEMBERED = 4  # sets of values
 
 
@@ -49,9 +51,9 @@ class Component:
     n_locations: int
 
     @property
-    def key(self) -> tuple[object, ...]:
+    def key(self) -> ComponentKey:
         """Distinguishes it from others."""
-        return (self.effect.name, *self.location.key)
+        return self.effect.name, self.location
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,7 +91,7 @@ class Hypothesis:
     _latest: dict[bytes, ModifiedStructure] = field(init=False, default_factory=dict, repr=False)
 
     @property
-    def key(self) -> tuple[tuple[object, ...], ...]:
+    def key(self) -> tuple[ComponentKey, ...]:
         """Distinguishes it from others."""
         return tuple(component.key for component in self.components)
 

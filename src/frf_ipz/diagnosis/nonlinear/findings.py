@@ -71,20 +71,21 @@ def make_findings(
     order = np.argsort(-gains)
     findings: dict[str, Finding] = {}
     for index in order:
-        fit, location = fits[index], modal_model.locations[fits[index].location]
+        fit = fits[index]
         if fit.law.name in findings:
             continue
         of_law = [i for i in order if fits[i].law is fit.law]
         share = np.cumsum(probability[of_law]) / max(probability[of_law].sum(), 1e-300)
         covering = of_law[: min(int(np.searchsorted(share, COVERAGE)) + 1, MAX_LOCATIONS)]
-        location_set = tuple(dict(modal_model.locations[fits[i].location].entries) for i in covering)
+        location_set = tuple(modal_model.locations[fits[i].location].place for i in covering)
         estimates = _estimate_parameters(fit, scale)
         phrase = fit.law.phrase.format(*(estimate.in_words() for estimate in estimates.values()))
         law_probability = float(probability[of_law].sum())
-        statement = with_confidence(f"At {location.words} sits {phrase} that the model lacks.", law_probability)
+        where = modal_model.describe_location(fit.location)
+        statement = with_confidence(f"At {where} sits {phrase} that the model lacks.", law_probability)
         findings[fit.law.name] = Finding(
             effect=fit.law.name,
-            location=dict(location.entries),
+            location=modal_model.locations[fit.location],
             parameters=estimates,
             probability=law_probability,
             log_evidence_gain=float(gains[index]),

@@ -44,7 +44,7 @@ def linearise(fit: LawFit, modal_model: ModalModel) -> LinearisedLaw:
     order = np.argsort(rms)
     stiffness, damping = _spring_and_damper(motion.ravel(), velocity.ravel(), force.ravel())
     return LinearisedLaw(
-        ends=modal_model.locations[fit.location].ends,
+        ends=modal_model.ends[fit.location],
         stiffness=stiffness,
         damping=damping,
         motion_rms_m=rms[order],

@@ -112,6 +112,6 @@ def describe_working_range(fit: LawFit, modal_model: ModalModel) -> str:
     """
     largest = np.abs(fit.motion).max(1)
     return (
-        f"It was fitted to motions of {modal_model.locations[fit.location].words} of up to {largest.max():.3g} m; the "
-        f"weakest record reached {largest.min():.3g} m."
+        f"It was fitted to motions of {modal_model.describe_location(fit.location)} of up to {largest.max():.3g} m; "
+        f"the weakest record reached {largest.min():.3g} m."
     )

@@ -10,7 +10,7 @@ can (`nonlinear_evidence`). If none does, the force is localised without a law: 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import chain
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.deadline import NO_LIMIT, Deadline
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.measured.preprocessing.dispersion import excess_delay_s
 from frf_ipz.diagnosis.nonlinear.channel_noise import read_noise
 from frf_ipz.diagnosis.nonlinear.findings import is_determined, log_evidence_gain, make_findings
@@ -108,7 +109,7 @@ class LawSearch:
         The best law at its location.
     nuisance_prior : NuisancePrior, optional
         That it was fitted with; `simulate` needs it.
-    location : mapping
+    location : Location
         Where a force of unknown law acts, as in `diagnosis.json`; empty where that was not searched or not found.
     dispersion_rad : float
         Dispersion of the converters that was removed before the law was fitted, see `remove_dispersion`; rad.
@@ -129,7 +130,7 @@ class LawSearch:
     modal_model: ModalModel | None = None
     fit: LawFit | None = None
     nuisance_prior: NuisancePrior | None = None
-    location: Mapping[str, object] = field(default_factory=dict)
+    location: Location = field(default_factory=Location)
     dispersion_rad: float = 0.0
     is_early: bool = False
     law_in_time: LawInTime | None = None
@@ -323,12 +324,12 @@ def _with_location(result: LawSearch, modal_model: ModalModel, located: SimpleLa
     misfit = located.mean_misfit
     if misfit > max(min(LOCATED, HALVED * located.linear_mean_misfit), part * located.linear_mean_misfit):
         return result
-    location = modal_model.locations[located.location]
-    remark = (
-        f"A force of another law at {location.words} would: it leaves {np.sqrt(misfit):.2g} times the expected misfit."
+    where = modal_model.describe_location(located.location)
+    remark = f"A force of another law at {where} would: it leaves {np.sqrt(misfit):.2g} times the expected misfit."
+    doubt = describe_location_set([modal_model.locations[i] for i in located.ambiguity_set])
+    return replace(
+        result, location=modal_model.locations[located.location], statement=f"{result.statement} {remark}{doubt}"
     )
-    doubt = describe_location_set([modal_model.locations[i].entries for i in located.ambiguity_set])
-    return replace(result, location=dict(location.entries), statement=f"{result.statement} {remark}{doubt}")
 
 
 def _hold_out(observations: Observations) -> tuple[Observations, Observations]:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Container, Iterable
 
     from frf_ipz.diagnosis.evidence.fit import Data, Fit
-    from frf_ipz.diagnosis.evidence.hypothesis import Component
+    from frf_ipz.diagnosis.evidence.hypothesis import Component, ComponentKey
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
 
 N_DISTANT = 8  # locations anywhere, no neighbours of each other, by the cost of a global scan
@@ -86,7 +86,7 @@ def add_distant_candidates(problem: InferenceProblem, ranking: Ranking, fits: Fi
 
 
 def find_next_neighbour(
-    problem: InferenceProblem, candidates: Iterable[Fit], known: Container[tuple[object, ...]]
+    problem: InferenceProblem, candidates: Iterable[Fit], known: Container[ComponentKey]
 ) -> tuple[Component, Fit] | None:
     """Choose an unknown neighbour of the first fit that has one.
 
@@ -121,7 +121,7 @@ class _Rescored:
     log_evidence: float
 
 
-_RescoredFits: TypeAlias = dict[tuple[object, ...], _Rescored]
+_RescoredFits: TypeAlias = "dict[ComponentKey, _Rescored]"
 
 
 def rescore_ambiguity_set(problem: InferenceProblem, ranking: Ranking) -> Ranking:
@@ -179,7 +179,7 @@ def _rescore_neighbours(
     strict_problems: dict[float, InferenceProblem],
 ) -> None:
     """Rescore neighbours of the best candidates until all further ones are worse."""
-    rejected: set[tuple[object, ...]] = set()
+    rejected: set[ComponentKey] = set()
     for _ in range(MAX_NEIGHBOURS):
         order = sorted(rescored.values(), key=lambda candidate: -candidate.log_evidence)
         candidates = [

@@ -16,10 +16,11 @@ from frf_ipz.diagnosis.search.robust_refinement import REFINED_ERROR, refine
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.catalogue.effect import Effect, Location
-    from frf_ipz.diagnosis.evidence.hypothesis import Component, Hypothesis
+    from frf_ipz.diagnosis.catalogue.effect import Effect
+    from frf_ipz.diagnosis.evidence.hypothesis import Component, ComponentKey, Hypothesis
+    from frf_ipz.diagnosis.location import Location
 
-Fits: TypeAlias = dict[tuple[object, ...], Fit]
+Fits: TypeAlias = "dict[ComponentKey, Fit]"
 """Fits by the key of their last component."""
 
 N_EFFECTS = 6  # effects whose neighbourhoods are searched
@@ -113,9 +114,8 @@ def list_imitators(problem: InferenceProblem, fit: Fit) -> list[Component]:
 
 def _is_within(location: Location, reference: Location) -> bool:
     """Say whether a location equals another, or is one of the two nodes that the other one joins."""
-    inner, outer = location.entries.get("nodes"), reference.entries.get("nodes")
-    is_end = isinstance(inner, list) and isinstance(outer, list) and set(inner) < set(outer)
-    return location.entries == reference.entries or is_end
+    is_end = bool(location.nodes) and set(location.nodes) < set(reference.nodes)
+    return is_end or location.place == reference.place
 
 
 def are_imitators(first: Effect, second: Effect) -> bool:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.evidence.hypothesis import Component
+    from frf_ipz.diagnosis.evidence.hypothesis import Component, ComponentKey
 
 N_OTHERS = 3  # other first components that are tried where a pair explains all
 N_OTHERS_INCOMPLETE = 5  # the same where it lacks a little
@@ -200,7 +200,7 @@ def _fit_pairs_roughly(problem: InferenceProblem, pairs: list[tuple[Component, S
 
 def _drop_duplicates(pairs: list[tuple[Component, Start]]) -> list[tuple[Component, Start]]:
     """Keep each pair once, the best first."""
-    unique: dict[frozenset[tuple[object, ...]], tuple[Component, Start]] = {}
+    unique: dict[frozenset[ComponentKey], tuple[Component, Start]] = {}
     for pair in sorted(pairs, key=lambda pair: pair[1].cost):
         unique.setdefault(frozenset((pair[0].key, pair[1].component.key)), pair)
     return list(unique.values())

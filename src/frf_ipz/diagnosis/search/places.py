@@ -10,7 +10,7 @@ Nachrichten von der Gesellschaft der Wissenschaften zu Göttingen (1923) 81-84.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray, IntArray
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
-    from frf_ipz.diagnosis.evidence.hypothesis import Component
+    from frf_ipz.diagnosis.evidence.hypothesis import Component, ComponentKey
     from frf_ipz.diagnosis.search.robust_refinement import Start
 
 PLACES_PER_MODE = 8  # in each domain of the highest mode: some three across it
@@ -105,12 +105,12 @@ def _group_by_node(
     context: ModelContext, n_coarse: int, components: Iterable[Component]
 ) -> tuple[list[PlaceGroup], list[Component]]:
     """Group components that differ by their node, where there are many of them; and give all others."""
-    alike: dict[tuple[object, ...], list[tuple[int, Component]]] = {}
+    alike: dict[ComponentKey, list[tuple[int, Component]]] = {}
     others: list[Component] = []
     for component in components:
-        nodes = component.location.entries.get("nodes")
-        if isinstance(nodes, list) and len(nodes) == 1 and nodes[0] in context.positions:
-            rest = tuple(part for part in component.key if part != nodes[0])
+        nodes = component.location.nodes
+        if len(nodes) == 1 and nodes[0] in context.positions:
+            rest = component.effect.name, replace(component.location, nodes=())
             alike.setdefault(rest, []).append((nodes[0], component))
         else:
             others.append(component)

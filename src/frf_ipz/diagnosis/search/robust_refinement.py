@@ -21,7 +21,7 @@ from frf_ipz.numerics.levenberg_marquardt import LevenbergMarquardt, NormalEquat
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.fit import Fit
-    from frf_ipz.diagnosis.evidence.hypothesis import Hypothesis
+    from frf_ipz.diagnosis.evidence.hypothesis import ComponentKey, Hypothesis
     from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
 
 STEP = 1e-4  # of the logarithm of a parameter, for its derivative
@@ -204,7 +204,7 @@ def refine_starts(problem: InferenceProblem, base: Fit, starts: Sequence[Start])
         for start in refined[:N_STEPPED]
         if start.cost < COST_RATIO * refined[0].cost
     ]
-    best: dict[tuple[object, ...], Start] = {}
+    best: dict[ComponentKey, Start] = {}
     for start in sorted([*stepped, *refined[len(stepped) :]], key=lambda start: start.cost):
         best.setdefault(start.component.key, start)
     return list(best.values())
@@ -296,16 +296,7 @@ def select_apart(starts: Iterable[Start], per_effect: int) -> list[Start]:
     for start in starts:
         of_effect = selected.setdefault(start.component.effect.name, [])
         if len(of_effect) < per_effect and not any(
-            _are_neighbours(start.component, selected_start.component) for selected_start in of_effect
+            start.component.location.is_near(known.component.location, NEIGHBOURHOOD) for known in of_effect
         ):
             of_effect.append(start)
     return [start for of_effect in selected.values() for start in of_effect]
-
-
-def _are_neighbours(first: Component, second: Component) -> bool:
-    if len(first.location.key) != len(second.location.key):
-        return False
-    pairs = list(zip(first.location.key, second.location.key, strict=True))
-    numbers = [abs(a - b) for a, b in pairs if isinstance(a, int) and isinstance(b, int)]
-    rest_agrees = all(a == b for a, b in pairs if not (isinstance(a, int) and isinstance(b, int)))
-    return rest_agrees and bool(numbers) and max(numbers) <= NEIGHBOURHOOD

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.evidence.fit import Fit
+    from frf_ipz.diagnosis.location import Location
 
 NORMAL_95 = 1.96
 LISTED_PROBABILITY = 0.95  # probability that the listed locations hold
@@ -127,7 +128,7 @@ def describe_component(
     gain: float,
     scale: float,
     *,
-    location_set: tuple[dict[str, object], ...],
+    location_set: tuple[Location, ...],
     across: FloatArray | float = 0.0,
 ) -> Finding:
     """Describe one component of a fit.
@@ -144,7 +145,7 @@ def describe_component(
         Its log Bayes factor over the fit without it.
     scale : float
         Intervals grow with its root.
-    location_set : tuple of dict
+    location_set : tuple of Location
         Its possible locations, the most probable first.
     across : (n_parameters,) array or float
         Variance of its parameters over its possible locations, in search coordinates.
@@ -161,8 +162,8 @@ def describe_component(
     start = sum(hypothesis.counts[:index])
     return Finding(
         effect=component.effect.name,
-        location=dict(component.location.entries),
-        parameters={**component.location.text, **estimates},
+        location=component.location,
+        parameters={**component.effect.texts(component.location), **estimates},
         probability=probability,
         log_evidence_gain=gain,
         statement=with_confidence(
@@ -171,7 +172,6 @@ def describe_component(
         + describe_location_set(location_set),
         location_set=location_set,
         is_significant=is_significant(fit, index),
-        key=component.location.key,
         values=tuple(float(value) for value in fit.values[start : start + hypothesis.counts[index]]),
     )
 
@@ -194,11 +194,11 @@ def probability_of_need(gain: float, scale: float) -> float:
     return float(expit(gain / scale))
 
 
-def _location_set(ranked_effect: RankedEffect) -> tuple[dict[str, object], ...]:
-    locations: list[dict[str, object]] = []
+def _location_set(ranked_effect: RankedEffect) -> tuple[Location, ...]:
+    locations: list[Location] = []
     total = 0.0
     for fit, share in zip(ranked_effect.fits[:MAX_LOCATIONS], ranked_effect.shares, strict=False):
-        location = dict(fit.hypothesis.components[-1].location.entries)
+        location = fit.hypothesis.components[-1].location.place
         if location not in locations:
             locations.append(location)
         total += share

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.diagnosis.evidence.inference_problem import compute_weights
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.response import nuisance_jacobian
 from frf_ipz.diagnosis.result import Curves
 from frf_ipz.diagnosis.search.global_scan import MOTIONS_AT_ONCE, evaluate_receptances
@@ -99,7 +100,7 @@ def _describe_table(table: pd.DataFrame, frequency_hz: FloatArray) -> str:
     )
 
 
-def localise_mismatch(problem: InferenceProblem, null: Fit) -> dict[str, list[int]]:
+def localise_mismatch(problem: InferenceProblem, null: Fit) -> Location:
     """Localise the misfit of the nominal model at a node.
 
     Parameters
@@ -111,15 +112,15 @@ def localise_mismatch(problem: InferenceProblem, null: Fit) -> dict[str, list[in
 
     Returns
     -------
-    dict
-        ``{"nodes": [node]}``; empty for a single FRF, or where no node explains much of the misfit.
+    Location
+        A node; empty for a single FRF, or where no node explains much of the misfit.
     """
     if len(problem.data.measured.labels) < MIN_FRFS:
-        return {}
+        return Location()
     dofs = problem.context.moving_dofs
     before, remaining = _compute_misfits(problem, null, [problem.context.motion(dof) for dof in dofs])
     best = int(np.argmin(remaining))
-    return {"nodes": [dofs[best].node]} if remaining[best] < (1 - MIN_EXPLAINED) * before else {}
+    return Location.at_node(dofs[best].node) if remaining[best] < (1 - MIN_EXPLAINED) * before else Location()
 
 
 def _compute_misfits(problem: InferenceProblem, null: Fit, motions: Sequence[Motion]) -> tuple[float, FloatArray]:

@@ -171,7 +171,7 @@ def describe_implausibility(fit: Fit) -> str:
 
 
 def _are_at_one_location(context: ModelContext, first: Component, second: Component) -> bool:
-    nodes = [_nodes_of(component) for component in (first, second)]
+    nodes = [set(component.location.nodes) for component in (first, second)]
     if nodes[0] & nodes[1]:
         return True
     spans = measure_extents(context.model)
@@ -179,11 +179,6 @@ def _are_at_one_location(context: ModelContext, first: Component, second: Compon
         return False
     distances = [_distance(context, a, b) for a in nodes[0] for b in nodes[1]]
     return min(distances, default=np.inf) <= SAME_LOCATION * max(spans.values())
-
-
-def _nodes_of(component: Component) -> set[int]:
-    named = component.location.entries.get("nodes")
-    return {int(node) for node in named} if isinstance(named, list) else set()
 
 
 def _distance(context: ModelContext, first: int, second: int) -> float:

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
 
-from frf_ipz.diagnosis.catalogue.effect import Builder, Location, Parameter, Signature
+from frf_ipz.diagnosis.catalogue.effect import Builder, Parameter, Signature
 from frf_ipz.diagnosis.catalogue.effects.viscoelastic_joint import SOFTEST, STIFFEST, ViscoelasticJoint, motion_at
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Attachment, Change
 from frf_ipz.diagnosis.search.component_search import rank_fits
 from frf_ipz.diagnosis.search.global_scan import scan_globally
@@ -105,10 +106,7 @@ def describe_location(context: ModelContext, location: Location) -> str:
     str
         A node or a spring.
     """
-    nodes = location.entries.get("nodes")
-    if isinstance(nodes, list):
-        return context.describe_node(int(nodes[0]))
-    return f"spring {location.key[1]}"
+    return f"spring {location.springs[0]}" if location.springs else context.describe_node(location.node)
 
 
 def _middle(context: ModelContext) -> float:

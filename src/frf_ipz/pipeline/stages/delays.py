@@ -33,6 +33,6 @@ def known_delays(fit: ModalFit, corrected_by: Diagnosis | None) -> dict[str, flo
             delays[label.output_channel] = max(delays[label.output_channel], float(delay))
     late = [finding for finding in (corrected_by.findings if corrected_by else ()) if finding.effect == DELAY]
     for finding in late:
-        for channel in outputs.intersection(map(str, finding.key)):
+        for channel in outputs.intersection(finding.location.channels):
             delays[channel] += float(finding.values[0])
     return {channel: delay for channel, delay in sorted(delays.items()) if delay > 0}

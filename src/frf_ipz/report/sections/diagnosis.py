@@ -10,7 +10,6 @@ from frf_ipz.plotting.diagnosis import (
     compared_misfits,
     effect_name,
     held_out_name,
-    location_text,
     probability_text,
 )
 from frf_ipz.plotting.wording import number, percent, with_error
@@ -73,7 +72,7 @@ def _finding_table(diagnosis: Diagnosis) -> Table:
             [
                 effect_name(finding.effect),
                 kind,
-                location_text(finding.location),
+                finding.location.text,
                 _parameters(finding),
                 probability_text(finding).removeprefix("= "),
                 number(finding.log_evidence_gain, 6),

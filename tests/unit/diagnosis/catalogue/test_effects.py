@@ -7,10 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosed import beam, labels, lumped
-from frf_ipz.diagnosis.catalogue.effect import Location
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.model_context import ModelContext
 from frf_ipz.diagnosis.evidence.hypothesis import Component, make_hypothesis
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.basis import make_basis
 from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.model.layout import make_layout
@@ -27,6 +27,9 @@ from frf_ipz.quantities import FrfQuantity
 
 BAND_HZ = (10.0, 700.0)
 MIDDLE = 2 * np.pi * np.sqrt(BAND_HZ[0] * BAND_HZ[1])
+FIRST_CHANNEL = Location.on_channel("acc_1")
+ONE_TO_THREE = Location(nodes=(1, 3), directions=("x",))
+LEFT_ROTATION = Location(end="left", nodes=(1,), directions=("ry",))
 S = 3.0 + 2j * np.pi * np.geomspace(*BAND_HZ, 60)
 REDUCED = 2e-4  # of the largest FRF: the basis has modes and static shapes, not all DOFs
 EXACT = 1e-9  # of the same numbers along two ways
@@ -47,12 +50,10 @@ def context_of(model, names):
     )
 
 
-def changed_frfs(model, name, key, values, names=None):
+def changed_frfs(model, name, location, values, names=None):
     """FRFs with an effect as the diagnosis evaluates them."""
     context = context_of(model, names or labels())
     effect = shipped_effects()[name]
-    locations = [location for location in effect.locations(context) if location.key == key]
-    location = locations[0] if locations else Location(key=key)
     nuisance_prior = make_nuisance_prior(context.basis, context.layout, DiagnoseOptions())
     hypothesis = make_hypothesis(context, nuisance_prior, (Component(effect=effect, location=location, n_locations=1),))
     return hypothesis.respond(np.array(values, float), np.zeros(nuisance_prior.size), S).values
@@ -65,19 +66,23 @@ def assert_same(actual, expected, tolerance):
 
 def test_the_nominal_model_is_that_of_the_fe_stage(tmp_path):
     model = beam(tmp_path)
-    assert_same(changed_frfs(model, "sensor_gain", ("acc_1", 1), [1.0]), compute_frfs(model, labels(), S), REDUCED)
+    assert_same(
+        changed_frfs(model, "sensor_gain", FIRST_CHANNEL, [1.0]),
+        compute_frfs(model, labels(), S),
+        REDUCED,
+    )
 
 
 def test_added_mass(tmp_path):
     model = beam(tmp_path)
     expected = compute_frfs(with_point_masses(model, {12: 0.03}), labels(), S)
-    assert_same(changed_frfs(model, "added_mass", (12, "z"), [0.03]), expected, REDUCED)
+    assert_same(changed_frfs(model, "added_mass", Location.at_node(12, "z"), [0.03]), expected, REDUCED)
 
 
 def test_grounded_spring(tmp_path):
     model = beam(tmp_path)
     expected = compute_frfs(with_springs(model, {Dof(12, "z"): 5e3}), labels(), S)
-    assert_same(changed_frfs(model, "grounded_spring", (12, "z"), [5e3]), expected, REDUCED)
+    assert_same(changed_frfs(model, "grounded_spring", Location.at_node(12, "z"), [5e3]), expected, REDUCED)
 
 
 def test_coupling_spring_on_a_frame(tmp_path):
@@ -88,7 +93,11 @@ def test_coupling_spring_on_a_frame(tmp_path):
     ends = [model.full_index(Dof(node, "x")) for node in (1, 3)]
     wide[np.ix_(ends, ends)] += stiffness * np.array([[1, -1], [-1, 1]])
     expected = damped_frfs(model, wide, model.mass_all.toarray(), names)
-    assert_same(changed_frfs(model, "coupling_spring", (1, 3, "x"), [stiffness], names), expected, REDUCED)
+    assert_same(
+        changed_frfs(model, "coupling_spring", ONE_TO_THREE, [stiffness], names),
+        expected,
+        REDUCED,
+    )
 
 
 def damped_frfs(model, stiffness, mass, names, ratio=0.01):
@@ -110,62 +119,66 @@ def damped_frfs(model, stiffness, mass, names, ratio=0.01):
 def test_local_stiffness_of_a_segment_and_of_a_spring(tmp_path):
     model = beam(tmp_path)
     expected = compute_frfs(with_scaled_parts(model, "element", ["5", "6"], stiffness_ratio=0.6), labels(), S)
-    assert_same(changed_frfs(model, "local_stiffness", ("element", 5, 6), [0.6]), expected, REDUCED)
+    assert_same(changed_frfs(model, "local_stiffness", Location(elements=(5, 6)), [0.6]), expected, REDUCED)
     frame = lumped(tmp_path)
     names = labels(("3:+x", "1:-x"), ("2:+x",))
     expected = compute_frfs(with_scaled_parts(frame, "spring", ["k2"], stiffness_ratio=1.4), names, S)
-    assert_same(changed_frfs(frame, "local_stiffness", ("spring", "k2"), [1.4], names), expected, REDUCED)
+    assert_same(changed_frfs(frame, "local_stiffness", Location(springs=("k2",)), [1.4], names), expected, REDUCED)
 
 
 def test_global_stiffness_moves_all_frequencies_alike(tmp_path):
     frame = lumped(tmp_path)
     names = labels(("3:+x", "1:-x"), ("2:+x",))
     expected = damped_frfs(frame, 1.21 * frame.stiffness_all.toarray(), frame.mass_all.toarray(), names)
-    assert_same(changed_frfs(frame, "global_stiffness", (), [1.21], names), expected, REDUCED)
+    assert_same(changed_frfs(frame, "global_stiffness", Location(), [1.21], names), expected, REDUCED)
 
 
 def test_boundary_compliance(tmp_path):
     model = beam(tmp_path)
     expected = compute_frfs(with_released_supports(model, {Dof(1, "ry"): 200.0}), labels(), S)
-    assert_same(changed_frfs(model, "boundary_compliance", ("left", ("ry",)), [200.0]), expected, REDUCED)
+    assert_same(
+        changed_frfs(model, "boundary_compliance", LEFT_ROTATION, [200.0]),
+        expected,
+        REDUCED,
+    )
 
 
 def test_axial_load(tmp_path):
     model = beam(tmp_path, right="pinned")
     names = labels(("9:+z",), ("6:+z",))
     expected = compute_frfs(with_axial_force(model, 300.0), names, S)
-    assert_same(changed_frfs(model, "axial_load", (), [300.0], names), expected, REDUCED)
+    assert_same(changed_frfs(model, "axial_load", Location(), [300.0], names), expected, REDUCED)
 
 
 def test_shear_and_rotary_inertia(tmp_path):
     model = beam(tmp_path, thickness_m=0.03)
     expected = compute_frfs(with_formulation(model, "timoshenko"), labels(), S)
-    assert_same(changed_frfs(model, "shear_rotary_inertia", (), []), expected, REDUCED)
+    assert_same(changed_frfs(model, "shear_rotary_inertia", Location(), []), expected, REDUCED)
 
 
 def test_damping_level(tmp_path):
     frame = lumped(tmp_path)
     names = labels(("3:+x",), ("2:+x",))
     expected = damped_frfs(frame, frame.stiffness_all.toarray(), frame.mass_all.toarray(), names, ratio=0.03)
-    assert_same(changed_frfs(frame, "damping_level", (), [0.03], names), expected, REDUCED)
+    assert_same(changed_frfs(frame, "damping_level", Location(), [0.03], names), expected, REDUCED)
 
 
 @pytest.mark.parametrize(
-    ("name", "key", "values", "dynamic"),
+    ("name", "location", "values", "dynamic"),
     [
-        ("local_damper", (1, "x"), [40.0], lambda s: 40.0 * s),
+        ("local_damper", Location.at_node(1, "x"), [40.0], lambda s: 40.0 * s),
         (
             "attached_resonator",
-            (1, "x"),
+            Location.at_node(1, "x"),
             [0.2, 60.0, 0.05],
             lambda s: 0.2 * s**2 * resonator(s) / (0.2 * s**2 + resonator(s)),
         ),
-        ("viscoelastic_joint", ("node", 3, "x"), [4e4, 2e-3], lambda s: 4e4 * s * 2e-3 / (1 + s * 2e-3)),
+        ("viscoelastic_joint", Location.at_node(3, "x"), [4e4, 2e-3], lambda s: 4e4 * s * 2e-3 / (1 + s * 2e-3)),
     ],
 )
-def test_what_is_attached(tmp_path, name, key, values, dynamic):
+def test_what_is_attached(tmp_path, name, location, values, dynamic):
     frame = lumped(tmp_path)
-    node = next(part for part in key if isinstance(part, int))
+    node = location.node
     names = labels(("3:+x", "1:+x"), ("2:+x",), FrfQuantity.RECEPTANCE)
     around = tuple(FrfLabel(parse_dof(f"{a}:+x"), parse_dof(f"{b}:+x"), FrfQuantity.RECEPTANCE) for a, b in (
         (3, node), (1, node), (node, 2), (node, node)))  # fmt: skip
@@ -173,7 +186,7 @@ def test_what_is_attached(tmp_path, name, key, values, dynamic):
     stiff = dynamic(S)
     effective = stiff / (1 + stiff * cross[:, 3])
     expected = bare - np.stack([cross[:, 0], cross[:, 1]], 1) * (effective * cross[:, 2])[:, None]
-    assert_same(changed_frfs(frame, name, key, values, names), expected, REDUCED)
+    assert_same(changed_frfs(frame, name, location, values, names), expected, REDUCED)
 
 
 def resonator(s):
@@ -187,15 +200,15 @@ def rising(ratio):
 
 
 @pytest.mark.parametrize(
-    ("key", "modulus", "ratio"),
+    ("form", "modulus", "ratio"),
     [
-        ((), lambda _, __: 1 + 0.04j, 0.01),
-        (("causal",), lambda s, _: rising(s / MIDDLE), 0.01),
-        (("causal, mode by mode",), lambda s, omega: rising(s / omega), 0.01),
-        (("of modes",), lambda _, __: 1, 0.03),
+        ("", lambda _, __: 1 + 0.04j, 0.01),
+        ("causal", lambda s, _: rising(s / MIDDLE), 0.01),
+        ("causal, mode by mode", lambda s, omega: rising(s / omega), 0.01),
+        ("of modes", lambda _, __: 1, 0.03),
     ],
 )
-def test_structural_damping(tmp_path, key, modulus, ratio):
+def test_structural_damping(tmp_path, form, modulus, ratio):
     frame = lumped(tmp_path)
     names = labels(("3:+x",), ("2:+x",), FrfQuantity.RECEPTANCE)
     free = ~frame.fixed
@@ -205,7 +218,7 @@ def test_structural_damping(tmp_path, key, modulus, ratio):
     stiffness = squares * modulus(S[:, None], np.sqrt(squares))
     modal = S[:, None] ** 2 + 2 * ratio * np.sqrt(squares) * S[:, None] + stiffness
     expected = ((shapes[2] * shapes[1]) / modal).sum(1)[:, None]
-    assert_same(changed_frfs(frame, "structural_damping", key, [0.04], names), expected, REDUCED)
+    assert_same(changed_frfs(frame, "structural_damping", Location(form=form), [0.04], names), expected, REDUCED)
 
 
 @pytest.mark.parametrize(
@@ -240,7 +253,7 @@ def test_a_damping_level_replaces_a_damping_matrix(tmp_path):
     frame = lumped(tmp_path, damping="rayleigh = { alpha_1_s = 3.0, beta_s = 2e-5 }")
     names = labels(("3:+x",), ("2:+x",))
     undamped = replace(frame, damping_all=0 * frame.damping_all, modal_damping=np.array([0.03]))
-    frfs_changed = changed_frfs(frame, "damping_level", (), [0.03], names)
+    frfs_changed = changed_frfs(frame, "damping_level", Location(), [0.03], names)
     assert_same(frfs_changed, compute_frfs(undamped, names, S), REDUCED)
     context = context_of(frame, names)
     effect = shipped_effects()["damping_level"]
@@ -255,61 +268,71 @@ def test_another_level_of_damping_goes_before_half_a_loss_factor_for_each_mode(t
     context = context_of(lumped(tmp_path), labels(("3:+x",), ("2:+x",)))
     effect = shipped_effects()["structural_damping"]
     priors = {
-        location.key: effect.log_prior(context, location, np.array([0.01])) for location in effect.locations(context)
+        location.form: effect.log_prior(context, location, np.array([0.01])) for location in effect.locations(context)
     }
-    assert priors["of modes",] < priors[()] == priors["causal",] == priors["causal, mode by mode",] == 0
-    assert priors["of modes",] > -5.0  # nats: it stays among what is reported
+    assert priors["of modes"] < priors[""] == priors["causal"] == priors["causal, mode by mode"] == 0
+    assert priors["of modes"] > -5.0  # nats: it stays among what is reported
 
 
-@pytest.mark.parametrize("key", [(), ("causal",), ("causal, mode by mode",), ("of modes",)])
-def test_half_a_loss_factor_goes_into_the_damping_of_a_corrected_model(tmp_path, key):
+@pytest.mark.parametrize("form", ["", "causal", "causal, mode by mode", "of modes"])
+def test_half_a_loss_factor_goes_into_the_damping_of_a_corrected_model(tmp_path, form):
     context = context_of(lumped(tmp_path), labels(("3:+x",), ("2:+x",)))
-    builder = shipped_effects()["structural_damping"].build(context, Location(key=key))
+    builder = shipped_effects()["structural_damping"].build(context, Location(form=form))
     corrected = with_change(context.model, builder(np.array([0.04])))
     assert_allclose(corrected.modal_damping, context.model.modal_damping + 0.02, rtol=EXACT)
 
 
 @pytest.mark.parametrize(
-    ("name", "key", "values", "factor"),
+    ("name", "location", "values", "factor"),
     [
-        ("sensor_gain", ("acc_2", -1), [1.3], lambda s: -1.3 + 0 * s),
-        ("time_delay", ("acc_2",), [1e-4], lambda s: np.exp(-1e-4 * s)),
-        ("sensor_dynamics", ("acc_2", "highpass"), [20.0], lambda s: s / (s + 40 * np.pi)),
-        ("sensor_dynamics", ("acc_2", "lowpass"), [900.0], lambda s: 1 / (1 + s / (1800 * np.pi))),
+        ("sensor_gain", Location.on_channel("acc_2", sign=-1), [1.3], lambda s: -1.3 + 0 * s),
+        ("time_delay", Location.on_channel("acc_2"), [1e-4], lambda s: np.exp(-1e-4 * s)),
+        ("sensor_dynamics", Location.on_channel("acc_2", form="highpass"), [20.0], lambda s: s / (s + 40 * np.pi)),
+        (
+            "sensor_dynamics",
+            Location.on_channel("acc_2", form="lowpass"),
+            [900.0],
+            lambda s: 1 / (1 + s / (1800 * np.pi)),
+        ),
     ],
 )
-def test_channels(tmp_path, name, key, values, factor):
+def test_channels(tmp_path, name, location, values, factor):
     model = beam(tmp_path)
-    plain = changed_frfs(model, "sensor_gain", ("acc_1", 1), [1.0])
-    frfs_changed = changed_frfs(model, name, key, values)
+    plain = changed_frfs(model, "sensor_gain", FIRST_CHANNEL, [1.0])
+    frfs_changed = changed_frfs(model, name, location, values)
     assert_allclose(frfs_changed[:, 0], plain[:, 0], rtol=EXACT)
     assert_allclose(frfs_changed[:, 1], plain[:, 1] * factor(S), rtol=EXACT)
-    force = changed_frfs(model, name, ("force", *key[1:]), values)
+    force = changed_frfs(model, name, replace(location, channels=("force",)), values)
     assert_allclose(force * np.broadcast_to(factor(S), S.shape)[:, None], plain, rtol=EXACT)
 
 
 def test_a_misplaced_sensor_shows_the_other_node(tmp_path):
     model = beam(tmp_path)
     expected = compute_frfs(model, labels(("17:+z", "13:-z")), S)
-    assert_same(changed_frfs(model, "sensor_misplaced", ("acc_2", 13), []), expected, REDUCED)
+    location = Location(channels=("acc_2",), nodes=(13,), directions=("z",))
+    assert_same(
+        changed_frfs(model, "sensor_misplaced", location, []),
+        expected,
+        REDUCED,
+    )
 
 
 @pytest.mark.parametrize(
-    ("name", "key", "values"),
+    ("name", "location", "values"),
     [
-        ("local_damper", (12, "z"), [3.0]),
-        ("attached_resonator", (12, "z"), [0.02, 120.0, 0.05]),
-        ("viscoelastic_joint", ("node", 12, "z"), [2e3, 2e-3]),
-        ("boundary_compliance", ("left", ("ry",)), [200.0]),
+        ("local_damper", Location.at_node(12, "z"), [3.0]),
+        ("attached_resonator", Location.at_node(12, "z"), [0.02, 120.0, 0.05]),
+        ("viscoelastic_joint", Location.at_node(12, "z"), [2e3, 2e-3]),
+        ("boundary_compliance", LEFT_ROTATION, [200.0]),
     ],
 )
-def test_the_change_as_matrices_is_the_change(tmp_path, name, key, values):
+def test_the_change_as_matrices_is_the_change(tmp_path, name, location, values):
     model = beam(tmp_path)
     context = context_of(model, labels())
-    change = shipped_effects()[name].build(context, Location(key=key))(np.array(values))
+    change = shipped_effects()[name].build(context, location)(np.array(values))
     s = 1j * S.imag
     changed = compute_frfs(with_change(model, change), labels(), S)
-    assert_same(changed, changed_frfs(model, name, key, values), LOSSES)
+    assert_same(changed, changed_frfs(model, name, location, values), LOSSES)
     assert np.isfinite(compute_frfs(with_change(model, change), labels(), s)).all()
 
 
@@ -318,10 +341,10 @@ def test_two_attachments_that_move_by_themselves_are_both_in_the_matrices(tmp_pa
     context = context_of(model, labels())
     effects = shipped_effects()
     resonator_, joint = (
-        effects[name].build(context, Location(key=key))(np.array(values))
-        for name, key, values in (
-            ("attached_resonator", (12, "z"), [0.02, 120.0, 0.05]),
-            ("viscoelastic_joint", ("node", 16, "z"), [2e3, 2e-3]),
+        effects[name].build(context, location)(np.array(values))
+        for name, location, values in (
+            ("attached_resonator", Location.at_node(12, "z"), [0.02, 120.0, 0.05]),
+            ("viscoelastic_joint", Location.at_node(16, "z"), [2e3, 2e-3]),
         )
     )
     one_by_one = with_change(with_change(model, resonator_), joint)

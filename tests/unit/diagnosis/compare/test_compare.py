@@ -130,7 +130,7 @@ def test_a_node_cannot_lose_more_than_it_has(nominal):
     before = state(with_point_masses(nominal, {14: HUNG_KG}), nominal, 1)
     context = pose_state_problem(before, split_data(before.observed), FEW.model).context
     effect = MassLoss()
-    (location,) = [location for location in effect.locations(context) if location.entries == {"nodes": [14]}]
+    (location,) = [location for location in effect.locations(context) if location == {"nodes": [14]}]
     (mass,) = effect.parameters(context, location)
     assert HUNG_KG < mass.high < HUNG_KG + context.mass_kg / 16  # and what an element has
     change = effect.build(context, location)(np.array([mass.high]))

@@ -34,7 +34,7 @@ def problem(tmp_path_factory):
 
 def mass_at(problem, node):
     components = list_components(problem.effects["added_mass"], problem.context)
-    return next(component for component in components if component.location.entries == {"nodes": [node]})
+    return next(component for component in components if component.location == {"nodes": [node]})
 
 
 def test_a_fit_at_a_wrong_location_is_stopped_above_the_limit(problem):

@@ -58,7 +58,7 @@ def localised(chain, strike):
 def test_a_force_is_localised_whatever_its_law(localised, name):
     location = LAWS[name][2]
     _, linear, localisation = localised(name)
-    assert dict(linear.nuisance_prior.modal_model.locations[localisation.equivalent[0]].entries) == location
+    assert dict(linear.nuisance_prior.modal_model.locations[localisation.equivalent[0]]) == location
     assert localisation.forces[0].cost < 1e-3 * linear.cost
     assert set(localisation.equivalent) <= set(localisation.possible)
     assert len(localisation.possible) < len(linear.nuisance_prior.modal_model.locations)

@@ -13,15 +13,13 @@ from frf_ipz.diagnosis.apply import correct_model
 from frf_ipz.diagnosis.nonlinear.laws.cubic_stiffness import CubicStiffness
 from frf_ipz.diagnosis.nonlinear.laws.dry_friction import DryFriction
 from frf_ipz.diagnosis.nonlinear.linearisation import linearise
-from frf_ipz.diagnosis.nonlinear.model.modal_model import Location
 from frf_ipz.diagnosis.result import Diagnosis, DiagnosisVerdict, LinearisedLaw, Misfit
 from frf_ipz.dofs import Dof
 from frf_ipz.runs.codec import load_result, save_result
 
 OMEGA, AMPLITUDES = 300.0, np.array([2e-4, 1e-4])
 SINE = 1e-3  # relative: whole periods in steps
-NODE = Location(entries={"nodes": [2]}, ends=(Dof(2, "x"),))
-SPRING = Location(entries={"springs": ["k3"]}, ends=(Dof(2, "x"), Dof(3, "x")))
+NODE, SPRING = (Dof(2, "x"),), (Dof(2, "x"), Dof(3, "x"))
 
 
 def swinging(law, strength, shape=0.0):
@@ -32,7 +30,7 @@ def swinging(law, strength, shape=0.0):
 
 
 def test_a_cubic_spring_is_that_of_harmonic_balance():
-    linear = linearise(swinging(CubicStiffness(), 1e12), SimpleNamespace(locations=[NODE]))
+    linear = linearise(swinging(CubicStiffness(), 1e12), SimpleNamespace(ends=[NODE]))
     assert_allclose(linear.motion_rms_m, AMPLITUDES[::-1] / np.sqrt(2), rtol=SINE)
     assert_allclose(linear.stiffness_by_record, 0.75e12 * AMPLITUDES[::-1] ** 2, rtol=SINE)
     assert np.abs(linear.damping_by_record * OMEGA).max() < SINE * linear.stiffness
@@ -41,7 +39,7 @@ def test_a_cubic_spring_is_that_of_harmonic_balance():
 
 
 def test_friction_is_the_damper_of_harmonic_balance():
-    linear = linearise(swinging(DryFriction(), 0.5, shape=1e-9), SimpleNamespace(locations=[NODE]))
+    linear = linearise(swinging(DryFriction(), 0.5, shape=1e-9), SimpleNamespace(ends=[NODE]))
     assert_allclose(linear.damping_by_record, 4 * 0.5 / (np.pi * AMPLITUDES[::-1] * OMEGA), rtol=0.01)
 
 
@@ -50,7 +48,7 @@ def test_a_spring_never_gives_energy():
     time = np.arange(4000) * 2 * np.pi / OMEGA / 1000
     dying.motion = AMPLITUDES[:, None] * np.exp(-20.0 * time) * np.cos(OMEGA * time)
     dying.velocity = np.gradient(dying.motion, time, axis=1)
-    linear = linearise(dying, SimpleNamespace(locations=[NODE]))
+    linear = linearise(dying, SimpleNamespace(ends=[NODE]))
     assert (linear.damping_by_record >= 0).all()
     assert (linear.stiffness_by_record > 0).all()
 
@@ -58,15 +56,15 @@ def test_a_spring_never_gives_energy():
 def test_an_impact_that_did_not_move_the_location_does_not_count():
     still = swinging(CubicStiffness(), 1e12)
     still.motion[1], still.velocity[1] = 0.0, 0.0
-    assert linearise(still, SimpleNamespace(locations=[NODE])).motion_rms_m.shape == (1,)
+    assert linearise(still, SimpleNamespace(ends=[NODE])).motion_rms_m.shape == (1,)
 
 
-@pytest.mark.parametrize("location", [NODE, SPRING])
-def test_the_linear_model_has_spring_and_damper(tmp_path, location):
+@pytest.mark.parametrize("ends", [NODE, SPRING])
+def test_the_linear_model_has_spring_and_damper(tmp_path, ends):
     model = lumped(tmp_path)
     nothing = Misfit(training=0.0, held_out=0.0, training_noise=0.0, held_out_noise=0.0)
     law = LinearisedLaw(
-        ends=location.ends,
+        ends=ends,
         stiffness=5e4,
         damping=3.0,
         motion_rms_m=np.array([1e-4]),
@@ -87,12 +85,12 @@ def test_the_linear_model_has_spring_and_damper(tmp_path, location):
         linearised_law=law,
     )
     changed = correct_model(diagnosis, model)
-    motion = dict(zip(reversed(location.ends), (1.0, -1.0), strict=False))
+    motion = dict(zip(reversed(ends), (1.0, -1.0), strict=False))
     row = np.array([motion.get(dof, 0.0) for dof in model.all_dofs])
     assert_allclose((changed.stiffness_all - model.stiffness_all).toarray(), 5e4 * np.outer(row, row))
     assert_allclose((changed.damping_all - model.damping_all).toarray(), 3.0 * np.outer(row, row))
     save_result(diagnosis, tmp_path / "d.result")
     loaded = load_result(tmp_path / "d.result")
     assert loaded.to_json()["linear_model"] == diagnosis.to_json()["linear_model"]
-    assert loaded.to_json()["linear_model"]["between"] == [dof.name for dof in location.ends]
+    assert loaded.to_json()["linear_model"]["between"] == [dof.name for dof in ends]
     assert "linear_model" not in replace(diagnosis, linearised_law=None).to_json()

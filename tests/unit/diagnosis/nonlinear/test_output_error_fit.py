@@ -35,7 +35,7 @@ def cubic(chain, strike):
         observations, modal_model, read_noise(observations), SegmentWindow(duration_s=1.0, floor=MODEL_ERROR)
     )
     options = DiagnoseOptions(stiffness_tolerance=5e-3)
-    location = next(i for i, p in enumerate(modal_model.locations) if p.entries == {"nodes": [3]})
+    location = next(i for i, p in enumerate(modal_model.locations) if p == {"nodes": [3]})
     return segments, make_nuisance_prior(modal_model, segments, observations.band_hz[1], options), location
 
 

@@ -34,7 +34,7 @@ def problem(chain, strike):
 
 def fit_at(problem, node):
     locations = problem.linear.nuisance_prior.modal_model.locations
-    location = next(i for i, p in enumerate(locations) if p.entries.get("nodes") == [node])
+    location = next(i for i, p in enumerate(locations) if p.nodes == (node,))
     start = LawStart(
         law=shipped_laws()["dry_friction"],
         location=location,

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.nonlinear import search
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import ForceLocalisation
 from frf_ipz.diagnosis.nonlinear.fitting.simple_laws import SimpleLawsFit
@@ -83,20 +84,24 @@ def test_long_segments_count_where_the_free_force_is_localised(monkeypatch, cost
     assert search._locate_unknown_force(state).location == location
 
 
+def at_nodes(*nodes):
+    return SimpleNamespace(
+        locations=[Location.at_node(node) for node in nodes], describe_location=lambda index: f"node {nodes[index]}"
+    )
+
+
 @pytest.mark.parametrize(
     ("misfit", "linear", "is_stated"), [(3.0, 50.0, True), (10.0, 50.0, False), (10.0, 260.0, True)]
 )
 def test_the_location_of_an_unknown_law_is_stated_where_a_force_there_explains_nearly_all(misfit, linear, is_stated):
-    modal_model = SimpleNamespace(locations=[SimpleNamespace(words="node 1", entries={"nodes": [1]})])
+    modal_model = at_nodes(1)
     unexplained = search.LawSearch(verdict=DiagnosisVerdict.UNEXPLAINED, linearity=None)
     located = simple_laws_at(0, 100 * misfit, linear_mean_misfit=linear)
     assert bool(search._with_location(unexplained, modal_model, located, search.MOSTLY).location) == is_stated
 
 
 def test_the_ambiguity_set_is_stated_with_the_location_of_an_unknown_law():
-    modal_model = SimpleNamespace(
-        locations=[SimpleNamespace(words=f"node {i}", entries={"nodes": [i]}) for i in range(9)]
-    )
+    modal_model = at_nodes(*range(9))
     located = replace(simple_laws_at(5, 20.0), ambiguity_set=(5, 6, 4))
     unexplained = search.LawSearch(verdict=DiagnosisVerdict.UNEXPLAINED, linearity=None)
     result = search._with_location(unexplained, modal_model, located, 0.5)

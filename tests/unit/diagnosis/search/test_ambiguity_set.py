@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from diagnosed import beam, labels, measured, problem_of
-from frf_ipz.diagnosis.catalogue.effect import Location
 from frf_ipz.diagnosis.catalogue.effects import coupling_spring
 from frf_ipz.diagnosis.evidence.hypothesis import Component
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.search import ambiguity_set as ties
 from frf_ipz.diagnosis.search.ambiguity_set import add_distant_candidates, find_next_neighbour, rescore_ambiguity_set
 from frf_ipz.diagnosis.search.component_search import Ranking, fit_null_model
@@ -37,14 +37,14 @@ def symmetric(nominal):
 def only(problem, *nodes, added_kg=ADDED_KG):
     """The ranking of a search that found some nodes only."""
     effect, null = problem.effects["added_mass"], fit_null_model(problem)
-    locations = {location.entries["nodes"][0]: location for location in effect.locations(problem.context)}
+    locations = {location.node: location for location in effect.locations(problem.context)}
     components = [Component(effect=effect, location=locations[node], n_locations=len(locations)) for node in nodes]
     fits = [problem.fit((component,), np.array([added_kg])) for component in components]
     return Ranking(base=null, fits=tuple(sorted(fits, key=lambda fit: -fit.log_evidence)), n_tried=0)
 
 
 def node_of(component):
-    return component.location.entries["nodes"][0]
+    return component.location.node
 
 
 def evidence(fits):
@@ -153,7 +153,7 @@ def test_imitators_are_rescored_at_the_location_of_the_best(nominal, monkeypatch
     problem = problem_of(nominal, frfs, ("grounded_spring", "coupling_spring"))
     effect = problem.effects["coupling_spring"]
     locations = effect.locations(problem.context)
-    wrong = [location for location in locations if location.entries["nodes"] in ([2, TRUE], [2, TRUE + 1])]
+    wrong = [location for location in locations if location.nodes in ((2, TRUE), (2, TRUE + 1))]
     components = [Component(effect=effect, location=location, n_locations=len(locations)) for location in wrong]
     fits = sorted(
         (problem.fit((component,), np.array([SPRING_N_M])) for component in components),
@@ -165,7 +165,7 @@ def test_imitators_are_rescored_at_the_location_of_the_best(nominal, monkeypatch
 
 def test_a_pair_of_nodes_is_as_likely_however_few_are_listed(symmetric, monkeypatch):
     effect = coupling_spring.CouplingSpring()
-    context, location = symmetric.context, Location(key=(5, 17, "z"), entries={"nodes": [5, 17]})
+    context, location = symmetric.context, Location(nodes=(5, 17), directions=("z",))
 
     def prior():
         n_locations = len(effect.locations(context))

@@ -34,7 +34,7 @@ def problem(tmp_path_factory):
 
 
 def nodes_of(component):
-    return tuple(component.location.entries["nodes"])
+    return component.location.nodes
 
 
 def test_a_global_scan_finds_values_closer_than_its_amplitudes_are_spaced(problem):
@@ -46,7 +46,7 @@ def test_a_global_scan_finds_values_closer_than_its_amplitudes_are_spaced(proble
 def test_a_global_scan_looks_between_the_locations_of_a_thinned_row(problem, monkeypatch):
     monkeypatch.setattr(coupling_spring, "MAX_IN_A_ROW", 12)
     locations = problem.effects["coupling_spring"].locations(problem.context)
-    assert ENDS not in [tuple(location.entries["nodes"]) for location in locations]
+    assert ENDS not in [location.nodes for location in locations]
     best = scan_globally(problem, fit_null_model(problem))[0]
     assert nodes_of(best.component) == ENDS
 
@@ -70,7 +70,7 @@ TRUE, ASTRAY, RESONATOR = 13, 14, np.array([0.02, 150.0, 0.02])  # nodes; kg, Hz
 
 def at_node(problem, node):
     effect = problem.effects["attached_resonator"]
-    location = next(location for location in effect.locations(problem.context) if location.entries == {"nodes": [node]})
+    location = next(location for location in effect.locations(problem.context) if location == {"nodes": [node]})
     return Component(effect=effect, location=location, n_locations=1)
 
 
@@ -85,5 +85,5 @@ def test_a_location_is_fitted_from_the_best_values_where_a_global_scan_finds_non
     monkeypatch.setattr(elsewhere, "scan_globally", lambda *_: [lost])
     monkeypatch.setattr(elsewhere, "search_neighbourhoods", lambda *_: None)
     ranking = elsewhere.fit_distant_locations(problem, Ranking(base=fit_null_model(problem), fits=(wrong,), n_tried=0))
-    assert ranking.best.hypothesis.components[-1].location.entries == {"nodes": [TRUE]}
+    assert ranking.best.hypothesis.components[-1].location == {"nodes": [TRUE]}
     assert ranking.best.values[:2] == pytest.approx(RESONATOR[:2], rel=EXACTLY)

@@ -7,6 +7,7 @@ import pytest
 
 from diagnosed import beam, measured, problem_of
 from frf_ipz.diagnosis.evidence.hypothesis import Component
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.search import component_search as searching
 from frf_ipz.diagnosis.search import neighbourhood_search as climb
 from frf_ipz.diagnosis.search import pair_search as pairs
@@ -27,13 +28,13 @@ def nominal(tmp_path_factory):
 def component_at(problem, name, *nodes):
     effect = problem.effects[name]
     locations = effect.locations(problem.context)
-    location = next(location for location in locations if location.entries.get("nodes") == list(nodes))
+    location = next(location for location in locations if location.nodes == tuple(nodes))
     return Component(effect=effect, location=location, n_locations=len(locations))
 
 
 def joint_at_end(problem):
     joint = problem.effects["viscoelastic_joint"]
-    (location,) = (location for location in joint.locations(problem.context) if location.key[0] == "end")
+    (location,) = (location for location in joint.locations(problem.context) if location.end)
     return Component(effect=joint, location=location, n_locations=16)
 
 
@@ -80,7 +81,7 @@ def test_a_neighbour_whose_fit_was_stopped_early_is_continued(nominal, times, is
     fits = {fit.hypothesis.components[-1].key: fit for fit in (neighbour, on_its_way)}
     climb._search_neighbourhood(problem, base, neighbour, fits)
     assert fits[true.hypothesis.components[-1].key].has_converged == is_settled
-    assert (likeliest(fits.values()).hypothesis.components[-1].location.entries == {"nodes": [12]}) == is_settled
+    assert (likeliest(fits.values()).hypothesis.components[-1].location == {"nodes": [12]}) == is_settled
 
 
 def test_a_neighbour_that_cannot_be_continued_is_fitted_anew_from_the_best(nominal, monkeypatch):
@@ -91,7 +92,7 @@ def test_a_neighbour_that_cannot_be_continued_is_fitted_anew_from_the_best(nomin
     monkeypatch.setattr(type(problem), "fit_to_convergence", lambda _bench, fit: fit)
     fits = {fit.hypothesis.components[-1].key: fit for fit in (neighbour, stuck)}
     climb._search_neighbourhood(problem, fit_null_model(problem), neighbour, fits)
-    assert likeliest(fits.values()).hypothesis.components[-1].location.entries == {"nodes": [12]}
+    assert likeliest(fits.values()).hypothesis.components[-1].location == {"nodes": [12]}
     assert likeliest(fits.values()).cost == pytest.approx(true.cost, rel=SEEN)
 
 
@@ -108,7 +109,7 @@ def test_where_the_first_component_moves_second_ones_are_searched_again(nominal,
     )
 
     def beside(_bench, base, _least):
-        assert base.hypothesis.components[0].location.entries == {"nodes": [12]}
+        assert base.hypothesis.components[0].location == {"nodes": [12]}
         return Ranking(base=base, fits=(true,), n_tried=1)
 
     monkeypatch.setattr(pairs, "search_small_component", beside)
@@ -133,7 +134,7 @@ def test_a_spring_whose_other_end_hardly_moves_is_tried_as_a_support(nominal):
     neighbour = problem.fit((component_at(problem, "coupling_spring", 2, 12),), np.array([2e3]))
     assert neighbour.is_nearly_right
     best = climbed(problem, base, neighbour).hypothesis.components[-1]
-    assert (best.effect.name, best.location.entries) == ("grounded_spring", {"nodes": [12]})
+    assert (best.effect.name, dict(best.location)) == ("grounded_spring", {"nodes": [12]})
 
 
 def test_an_imitator_is_fitted_from_values_that_do_the_same_in_the_band(nominal, monkeypatch):
@@ -151,7 +152,7 @@ def test_an_imitator_is_fitted_from_values_that_do_the_same_in_the_band(nominal,
     monkeypatch.setattr(climb, "refine", lambda _hypothesis, _measured, _weights, values, **_: (values, 0.0))
     best = climbed(problem, base, neighbour)
     component = best.hypothesis.components[-1]
-    assert (component.effect.name, component.location.entries) == ("viscoelastic_joint", {"nodes": [14]})
+    assert (component.effect.name, dict(component.location)) == ("viscoelastic_joint", {"nodes": [14]})
     assert best.values == pytest.approx([3e3, 4e-4], rel=SEEN)
 
 
@@ -165,7 +166,7 @@ def test_the_end_of_a_beam_is_tried_with_values_of_its_own(tmp_path, monkeypatch
     monkeypatch.setattr(type(problem), "fit", lambda *_, **__: neighbour)  # no beginning anew
     monkeypatch.setattr(climb, "refine", lambda _hypothesis, _measured, _weights, values, **_: (values, 0.0))
     best = climbed(problem, base, neighbour)
-    assert best.hypothesis.components[-1].location.entries == {"end": "left", "nodes": [1]}
+    assert best.hypothesis.components[-1].location == {"end": "left", "nodes": [1]}
     assert best.values == pytest.approx([30.0, 5e-4], rel=SEEN)
 
 
@@ -174,11 +175,11 @@ def test_surroundings_are_chosen_near_the_axis(nominal, monkeypatch):
     problem = problem_with(nominal, ("coupling_spring",), [("coupling_spring", 6, 15)], [4e3])
     neighbour = problem.fit((component_at(problem, "coupling_spring", 4, 14),), np.array([4e3]))
     around = climb.refine_surroundings(problem, neighbour.hypothesis.components, neighbour.values)
-    true = [components[-1].location.entries["nodes"] for components, _ in around].index([6, 15])
+    true = [components[-1].location.nodes for components, _ in around].index((6, 15))
     wrong = [entry for index, entry in enumerate(around) if index != true]
     blurred = [*wrong[: climb.N_GLANCED - 1], around[true], *wrong[climb.N_GLANCED - 1 :]]
     monkeypatch.setattr(climb, "refine_surroundings", lambda *_: blurred)
-    assert climb._promising_surroundings(problem, neighbour)[0].entries == {"nodes": [6, 15]}
+    assert climb._promising_surroundings(problem, neighbour)[0].nodes == (6, 15)
 
 
 def test_of_several_starts_the_data_choose(nominal):
@@ -203,7 +204,7 @@ def test_a_second_component_is_searched_beside_a_first_that_leaves_much(nominal,
     names = ("grounded_spring", "sensor_dynamics", "sensor_gain")
     problem = problem_with(nominal, names, [("grounded_spring", 12)], [2e3])
     late = problem.effects["sensor_dynamics"]
-    location = next(location for location in late.locations(problem.context) if location.key == ("acc_2", "highpass"))
+    location = Location.on_channel("acc_2", form="highpass")
     pair = (component_at(problem, "grounded_spring", 12), Component(effect=late, location=location, n_locations=4))
 
     def chain(frequency_hz):
@@ -230,7 +231,5 @@ def test_two_resonators_give_way_to_simpler_effects(nominal):
     fit = problem.fit(two, np.array([0.02, 11.0, 0.5, 0.3, 11.0, 1e-3]))
     base = problem.fit(two[:1], fit.values[:3])
     best = pairs._try_simpler_effects(problem, Ranking(base=base, fits=(fit,), n_tried=1)).best
-    components = {
-        (component.effect.name, *component.location.entries["nodes"]) for component in best.hypothesis.components
-    }
+    components = {(component.effect.name, *component.location.nodes) for component in best.hypothesis.components}
     assert components == {("local_damper", 15), ("grounded_spring", 9)}

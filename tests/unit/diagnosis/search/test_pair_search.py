@@ -10,11 +10,11 @@ from numpy.testing import assert_allclose
 from diagnosed import beam, labels, measured, observed, problem_of
 from frf_ipz.diagnosis import diagnose as diagnosing
 from frf_ipz.diagnosis.apply import correct_frfs, correct_model
-from frf_ipz.diagnosis.catalogue.effect import Location
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.joint_change import build_together
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.evidence.hypothesis import Component
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search import pair_search as pairs
@@ -66,7 +66,7 @@ def test_a_delay_beside_a_soft_element_is_promised(nominal):
     """Static shapes of the element are in its fit: what a delay changes is not hidden behind what they change."""
     soft = problem_of(nominal, measured(nominal), ("local_stiffness",))
     effect = soft.effects["local_stiffness"]
-    location = next(location for location in effect.locations(soft.context) if location.entries == {"elements": [3, 3]})
+    location = next(location for location in effect.locations(soft.context) if location.elements == (3, 3))
     true = with_change(nominal, effect.build(soft.context, location)(np.array([0.3])))
     frfs = measured(true, factors=lambda hz: np.stack([np.exp(-2j * np.pi * hz * LATE_S), np.ones_like(hz)], 1))
     problem = problem_of(nominal, frfs, ("local_stiffness", "time_delay"))
@@ -119,7 +119,7 @@ def test_a_small_delay_is_found_though_the_misfit_is_large(nominal):
     null = fit_null_model(problem)
     assert null.misfit > 20 * null.n_values
     best = search_component(problem, null).best
-    assert best.hypothesis.components[-1].key == ("time_delay", "acc_2")
+    assert best.hypothesis.components[-1].key == ("time_delay", Location.on_channel("acc_2"))
     assert best.values[0] == pytest.approx(3e-5, rel=SEEN)
 
 
@@ -137,7 +137,7 @@ def test_a_small_effect_beside_one_that_explains_nearly_all_is_named(nominal, mo
         "added_mass",
         "grounded_spring",
     ]
-    assert decision.further_rankings[0].base.hypothesis.components[0].location.entries == {"nodes": [12]}
+    assert decision.further_rankings[0].base.hypothesis.components[0].location == {"nodes": [12]}
 
 
 @pytest.mark.parametrize(("part", "verdict"), [(0.95, "consistent"), (0.8, "explained")])
@@ -196,7 +196,7 @@ def test_damping_that_nothing_explains_does_not_hide_a_mass(nominal):
 def test_a_segment_of_usual_length_is_preferred_to_a_short_one_that_does_the_same(nominal):
     problem = problem_of(nominal, measured(nominal), ("local_stiffness",))
     effect = problem.effects["local_stiffness"]
-    locations = {location.key[1:]: location for location in effect.locations(problem.context)}
+    locations = {location.elements: location for location in effect.locations(problem.context)}
     likely = {length: effect.log_prior(problem.context, locations[1, length], np.array([0.9])) for length in (1, 2, 4)}
     assert likely[1] > likely[2] > likely[4]  # 4 % of 16 elements are less than one
     smaller = effect.log_prior(problem.context, locations[1, 1], np.array([0.95]))
@@ -207,9 +207,7 @@ def with_components(problem, *named):
     components = []
     for name, node in named:
         effect = problem.effects[name]
-        location = next(
-            location for location in effect.locations(problem.context) if location.entries.get("nodes") == [node]
-        )
+        location = next(location for location in effect.locations(problem.context) if location.nodes == (node,))
         components.append(Component(effect=effect, location=location, n_locations=1))
     hypothesis = problem.make_hypothesis(tuple(components))
     return SimpleNamespace(hypothesis=hypothesis, values=hypothesis.to_physical((hypothesis.low + hypothesis.high) / 2))
@@ -243,9 +241,7 @@ def test_a_resonator_of_large_damping_is_implausible(nominal, ratio, reason):
 
 
 def test_two_resonators_at_one_node_are_not_named(nominal):
-    first, second = (
-        Component(effect=ATTACHED, location=Location(key=(17, "z"), entries={"nodes": [17]}), n_locations=1),
-    ) * 2
+    first, second = (Component(effect=ATTACHED, location=Location.at_node(17, "z"), n_locations=1),) * 2
     problem = problem_of(nominal, measured(nominal), ("attached_resonator",))
     hypothesis = problem.make_hypothesis((first, second))
     values, nuisance = np.array([0.02, 40.0, 0.03, 0.02, 250.0, 0.03]), np.zeros(problem.nuisance_prior.size)
@@ -278,12 +274,12 @@ def test_a_joint_at_a_pinned_end_is_tried_and_is_likelier_than_one_beside_it(tmp
     model = beam(tmp_path, left="pinned", right="pinned")
     problem = problem_of(model, measured(model, labels(outputs=("12:+z", "9:-z"))), ("viscoelastic_joint",))
     effect, values = problem.effects["viscoelastic_joint"], np.array([100.0, 1e-3])
-    locations = {location.key[:2]: location for location in effect.locations(problem.context)}
-    beside = effect.neighbours(problem.context, locations["node", 16])
-    assert {location.key[:2] for location in beside} >= {("node", 15), ("end", "left"), ("end", "right")}
+    locations = {location.end or location.node: location for location in effect.locations(problem.context)}
+    beside = effect.neighbours(problem.context, locations[16])
+    assert {location.end or location.node for location in beside} >= {15, "left", "right"}
     prior = {key: effect.log_prior(problem.context, location, values) for key, location in locations.items()}
-    assert prior["end", "right"] == pytest.approx(np.log(15 / 2))  # 15 nodes that move, two ends
-    assert prior["node", 16] == 0.0
+    assert prior["right"] == pytest.approx(np.log(15 / 2))  # 15 nodes that move, two ends
+    assert prior[16] == 0.0
 
 
 def test_one_damping_ratio_far_beyond_its_tolerance_is_not_consistent(nominal):
@@ -319,9 +315,9 @@ def test_a_small_gain_is_not_taken_for_a_wrong_sign(nominal):
     problem = problem_of(nominal, frfs, ("sensor_gain",))
     starts = run_score_test(problem, fit_null_model(problem))
     best = min(starts, key=lambda start: start.cost)
-    assert best.component.location.key == ("acc_1", 1)
+    assert best.component.location == Location.on_channel("acc_1")
     assert SMALL_GAIN < best.values[0] < 1  # tolerances take their part
-    assert all(start.cost > 0 for start in starts if start.component.location.key[1] == -1)
+    assert all(start.cost > 0 for start in starts if start.component.location.sign == -1)
 
 
 @pytest.mark.slow
@@ -372,14 +368,14 @@ def test_the_best_location_of_each_effect_is_fitted_before_second_ones():
         Start(component=a_component(number, location), values=np.ones(1), cost=-nats)
         for number, location, nats in promised
     ]
-    chosen = [(start.component.effect.name, start.component.location.key[0]) for start in _most_promising(starts, 45.0)]
+    chosen = [(start.component.effect.name, start.component.location.node) for start in _most_promising(starts, 45.0)]
     assert chosen[:5] == [(number, 0) for number in range(5)]  # the sixth promises less
     assert len(chosen) == N_SCORED - 1
     assert (4, 10) not in chosen
 
 
 def a_component(name, location):
-    return SimpleNamespace(effect=SimpleNamespace(name=name), location=SimpleNamespace(key=(location, "z")))
+    return SimpleNamespace(effect=SimpleNamespace(name=name), location=Location.at_node(location, "z"))
 
 
 def one_of(name, log_evidence):
@@ -391,10 +387,10 @@ def one_of(name, log_evidence):
 def test_the_first_of_two_components_is_located_anew_beside_the_second(nominal):
     true = with_springs(with_point_masses(nominal, {12: 0.002}), {Dof(8, "z"): 3e3})
     problem, mass = problem_of(nominal, measured(true), ("grounded_spring",)), shipped_effects()["added_mass"]
-    beside = next(location for location in mass.locations(problem.context) if location.entries == {"nodes": [13]})
+    beside = next(location for location in mass.locations(problem.context) if location == {"nodes": [13]})
     wrong = problem.fit((Component(effect=mass, location=beside, n_locations=16),), np.array([0.002]))
     ranking = search_pair(problem, Ranking(base=fit_null_model(problem), fits=(wrong,), n_tried=1), lambda _: True)
-    assert {component.key[:2] for component in ranking.best.hypothesis.components} == {
+    assert {(component.effect.name, component.location.node) for component in ranking.best.hypothesis.components} == {
         ("added_mass", 12),
         ("grounded_spring", 8),
     }

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from frf_ipz.diagnosis.catalogue.effect import Location
 from frf_ipz.diagnosis.evidence.hypothesis import Component
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.search.places import PLACES_PER_MODE, search_places
 from frf_ipz.diagnosis.search.robust_refinement import Start
 
@@ -18,11 +18,8 @@ def context_of(*, is_schematic=False):
     return SimpleNamespace(positions=NODES, model=SimpleNamespace(geometry=SimpleNamespace(is_schematic=is_schematic)))
 
 
-def at_all_nodes(effect, key=lambda node: (node, "z")):
-    return [
-        Component(effect=effect, location=Location(key=key(node), entries={"nodes": [node]}), n_locations=len(NODES))
-        for node in NODES
-    ]
+def at_all_nodes(effect, locate=lambda node: Location.at_node(node, "z")):
+    return [Component(effect=effect, location=locate(node), n_locations=len(NODES)) for node in NODES]
 
 
 def cost_at(true_node, evaluated):
@@ -32,7 +29,7 @@ def cost_at(true_node, evaluated):
         evaluated.extend(components)
         starts = []
         for component in components:
-            here = NODES[component.location.entries["nodes"][0]]
+            here = NODES[component.location.node]
             near, far = (np.linalg.norm(here - NODES[node]) for node in (true_node, 17))
             cost = -np.exp(-((near / 4) ** 2)) - 0.8 * np.exp(-((far / 6) ** 2))
             starts.append(Start(component=component, values=np.zeros(0), cost=cost))
@@ -45,17 +42,23 @@ def test_the_best_of_a_thousand_places_is_found_by_looking_at_a_third_of_them():
     for true_node in (1, 617, 618, 619, 1200):
         evaluated = []
         starts = search_places(context_of(), 16, at_all_nodes(MASS), cost_at(true_node, evaluated))
-        assert min(starts, key=lambda start: start.cost).component.location.key[0] == true_node
+        assert min(starts, key=lambda start: start.cost).component.location.node == true_node
         assert len(evaluated) == len({component.key for component in evaluated}) < len(NODES) / 3
 
 
 def test_each_channel_has_its_own_coarse_places():
-    components = at_all_nodes(SENSOR, lambda node: ("acc_1", node)) + at_all_nodes(SENSOR, lambda node: ("acc_2", node))
+    components = [
+        component
+        for channel in ("acc_1", "acc_2")
+        for component in at_all_nodes(
+            SENSOR, lambda node, channel=channel: Location(channels=(channel,), nodes=(node,))
+        )
+    ]
     evaluated = []
     search_places(context_of(), 16, components, cost_at(600, evaluated))
-    keys = [component.location.key for component in evaluated]
-    assert {node for channel, node in keys if channel == "acc_1"} == {
-        node for channel, node in keys if channel == "acc_2"
+    keys = [component.location for component in evaluated]
+    assert {location.node for location in keys if location.channel == "acc_1"} == {
+        location.node for location in keys if location.channel == "acc_2"
     }
     assert len(keys) > 2 * 16 * PLACES_PER_MODE
 

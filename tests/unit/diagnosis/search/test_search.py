@@ -13,6 +13,7 @@ from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.evidence.hypothesis import Component
 from frf_ipz.diagnosis.evidence.inference_problem import compute_weights, pose_problem
 from frf_ipz.diagnosis.evidence.map_fit import fit_map
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.measured.transfer_functions import FAINT, find_faint_frfs, raise_faint_sizes
 from frf_ipz.diagnosis.model.basis import solve_changed_modes
@@ -142,7 +143,7 @@ def test_all_wrong_places_of_a_sensor_in_one_product_are_those_that_are_evaluate
     null = problem.make_hypothesis(())
     base = fit_map(null, problem.rough_data, np.zeros(0), iterations=0)
     starts = scan_globally(problem, base)
-    assert {start.component.location.key[0] for start in starts} == {
+    assert {start.component.location.channel for start in starts} == {
         channel for channel, _ in problem.context.layout.outputs
     }
     weights, nuisance = compute_weights(problem.coarse, SCAN_ERROR), np.zeros(problem.nuisance_prior.size)
@@ -164,41 +165,41 @@ def test_three_effects_are_found_at_once(nominal):
 def test_both_ends_of_a_spring_move_at_once(nominal):
     problem = problem_of(nominal, measured(nominal), ("coupling_spring",))
     effect = problem.effects["coupling_spring"]
-    location = next(location for location in effect.locations(problem.context) if location.key == (5, 12, "z"))
-    beside = {neighbour.key[:2] for neighbour in effect.neighbours(problem.context, location)}
+    location = next(location for location in effect.locations(problem.context) if location.nodes == (5, 12))
+    beside = {neighbour.nodes for neighbour in effect.neighbours(problem.context, location)}
     assert {(4, 13), (6, 11), (4, 11), (6, 13)} <= beside
-    at_the_end = next(location for location in effect.locations(problem.context) if location.key == (5, 17, "z"))
-    assert all(max(neighbour.key[:2]) <= 17 for neighbour in effect.neighbours(problem.context, at_the_end))
+    at_the_end = next(location for location in effect.locations(problem.context) if location.nodes == (5, 17))
+    assert all(max(neighbour.nodes) <= 17 for neighbour in effect.neighbours(problem.context, at_the_end))
 
 
 def with_coupling(model, pair, stiffness):
     context = problem_of(model, measured(model), ("coupling_spring",)).context
     effect = shipped_effects()["coupling_spring"]
-    location = next(location for location in effect.locations(context) if location.key[:2] == pair)
+    location = next(location for location in effect.locations(context) if location.nodes == pair)
     return with_change(model, effect.build(context, location)(np.array([stiffness])))
 
 
 def test_the_ends_of_a_spring_are_searched_further_around(nominal):
     effect = shipped_effects()["coupling_spring"]
     problem = problem_of(nominal, measured(with_coupling(nominal, (6, 13), 2e4)), (effect.name,))
-    locations = {location.key[:2]: location for location in effect.locations(problem.context)}
-    assert locations[6, 13].key in {location.key for location in effect.surroundings(problem.context, locations[3, 14])}
+    locations = {location.nodes: location for location in effect.locations(problem.context)}
+    assert locations[6, 13] in effect.surroundings(problem.context, locations[3, 14])
     component = Component(effect=effect, location=locations[3, 14], n_locations=100)
     refined = climb.refine_surroundings(problem, (component,), np.array([2e4]))
-    assert refined[0][0][-1].location.entries == {"nodes": [6, 13]}
+    assert refined[0][0][-1].location.nodes == (6, 13)
     assert refined[0][1] == pytest.approx(2e4, rel=0.05)
 
 
 def test_where_no_start_fits_its_surroundings_are_tried(nominal, monkeypatch):
     effect = shipped_effects()["coupling_spring"]
     problem = problem_of(nominal, measured(with_coupling(nominal, (6, 13), 2e4)), (effect.name,))
-    wrong = next(location for location in effect.locations(problem.context) if location.key[:2] == (3, 14))
+    wrong = next(location for location in effect.locations(problem.context) if location.nodes == (3, 14))
     start = Start(component=Component(effect=effect, location=wrong, n_locations=100), values=np.array([2e4]), cost=1.0)
     monkeypatch.setattr(search, "refine_halfway", lambda _bench, starts: starts)
     fits = {}
     search._fit_starts(problem, fit_null_model(problem), [start], fits)
     best = max(fits.values(), key=lambda fit: fit.log_evidence)
-    assert best.hypothesis.components[-1].location.entries == {"nodes": [6, 13]}
+    assert best.hypothesis.components[-1].location.nodes == (6, 13)
 
 
 def test_faint_frfs_are_known_no_better_than_the_large_ones(nominal):
@@ -220,9 +221,7 @@ def fit_of(name, evidence, value, std, location):
     effect = SimpleNamespace(
         name=name, report_value=lambda _make_location, _name, value: value, statement=lambda *_: "", imitators=()
     )
-    component = SimpleNamespace(
-        effect=effect, location=SimpleNamespace(entries={"nodes": [location]}, text={}, key=(location,))
-    )
+    component = SimpleNamespace(effect=effect, location=Location.at_node(location))
     parameter = SimpleNamespace(name="mass_kg", is_log=True, low=1e-4, high=1.0, tolerance=0.0)
     hypothesis = SimpleNamespace(
         components=(component,), counts=(1,), parameters=(parameter,), context=None,

@@ -168,7 +168,7 @@ def test_an_effect_may_explain_what_strains_the_nominal_model(nominal):
 
 def test_what_follows_the_traces_of_laws_is_not_believed_beside_one(nominal):
     problem = problem_of(nominal, measured(nominal), ("attached_resonator",))
-    location = next(location for location in ATTACHED.locations(problem.context) if location.entries == {"nodes": [12]})
+    location = next(location for location in ATTACHED.locations(problem.context) if location == {"nodes": [12]})
     true = with_change(nominal, ATTACHED.build(problem.context, location)(np.array([0.01, 250.0, 0.02])))
     frfs = measured(true)
     laws = Laws("explained")

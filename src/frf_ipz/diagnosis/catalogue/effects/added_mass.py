@@ -10,12 +10,12 @@ import numpy as np
 from frf_ipz.diagnosis.catalogue.effect import (
     Builder,
     Effect,
-    Location,
     Parameter,
     Signature,
     list_neighbouring_nodes,
     list_node_locations,
 )
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.fe.changes import with_point_masses
 
@@ -45,15 +45,14 @@ class AddedMass(Effect):
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Mass in all translational directions of the node."""
         model = context.model
-        unit = with_point_masses(model, {int(str(location.key[0])): 1.0}).mass_all - model.mass_all
+        unit = with_point_masses(model, {location.node: 1.0}).mass_all - model.mass_all
         return lambda values: Change(mass=values[0] * unit)
 
     def signature(self, context: ModelContext, location: Location) -> Signature:
         """s^2 m against the direction of the test."""
-        node, direction = location.key
         amplitudes = np.geomspace(3e-4, 1.0, 14) * context.mass_kg
         return Signature(
-            motion=context.motion_at(node, direction),
+            motion=context.motion(location.dof),
             shapes=context.contour[None] ** 2,
             values=np.ones((1, 1)),
             amplitudes=amplitudes,
@@ -67,12 +66,10 @@ class AddedMass(Effect):
         """Say how much sits where."""
         mass = values["mass_kg"]
         return (
-            f"A mass of {mass.in_words('g', 1e3)} sits at "
-            f"{context.describe_node(int(str(location.key[0])))} that the model lacks."
+            f"A mass of {mass.in_words('g', 1e3)} sits at {context.describe_node(location.node)} that the model lacks."
         )
 
 
 def _one_per_node(locations: Sequence[Location]) -> list[Location]:
     """Keep one location a node: a mass acts in all directions."""
-    first = {location.key[0]: location for location in reversed(locations)}
-    return [first[node] for node in sorted(first, key=lambda node: int(str(node)))]
+    return sorted({location.node: location for location in reversed(locations)}.values())

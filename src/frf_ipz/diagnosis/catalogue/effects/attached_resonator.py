@@ -13,14 +13,13 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.catalogue.effect import (
     Builder,
     Effect,
-    Location,
     Parameter,
     Signature,
     list_neighbouring_nodes,
     list_node_locations,
 )
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Attachment, Change
-from frf_ipz.diagnosis.model.motion import Motion
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -58,7 +57,7 @@ class AttachedResonator(Effect):
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Attach its dynamic stiffness."""
-        motion = _motion(context, location).dense(len(context.model.all_dofs))[:, None]
+        motion = context.motion(location.dof).dense(len(context.model.all_dofs))[:, None]
 
         def change(values: np.ndarray) -> Change:
             mass, frequency_hz, ratio = values
@@ -76,7 +75,7 @@ class AttachedResonator(Effect):
     def signature(self, context: ModelContext, location: Location) -> Signature:
         """All frequencies and some damping ratios."""
         shapes, values, amplitudes = _make_shapes(context)
-        return Signature(motion=_motion(context, location), shapes=shapes, values=values, amplitudes=amplitudes)
+        return Signature(motion=context.motion(location.dof), shapes=shapes, values=values, amplitudes=amplitudes)
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside."""
@@ -102,7 +101,7 @@ class AttachedResonator(Effect):
         """Say what is attached where."""
         return (
             f"A resonator of {values['mass_kg'].in_words('g', 1e3)} is attached at "
-            f"{context.describe_node(int(str(location.key[0])))} that the model lacks: its natural frequency is "
+            f"{context.describe_node(location.node)} that the model lacks: its natural frequency is "
             f"{values['frequency_hz'].in_words('Hz')}, its damping ratio {values['damping_ratio'].in_words('%', 100)}."
         )
 
@@ -137,8 +136,3 @@ def dynamic_mass(s: ComplexArray, frequency_hz: float, ratio: float) -> ComplexA
     omega = 2 * np.pi * frequency_hz
     spring = omega**2 + 2 * ratio * omega * s
     return np.asarray(s**2 * spring / (s**2 + spring))
-
-
-def _motion(context: ModelContext, location: Location) -> Motion:
-    node, direction = location.key
-    return context.motion_at(node, direction)

@@ -10,7 +10,8 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.fe.beam_models import geometric_stiffness
 from frf_ipz.fe.kinds.beam import BeamFile
@@ -33,7 +34,7 @@ class AxialLoad(Effect):
         """Return a beam that is held at both ends."""
         source = context.model.source
         applies = isinstance(source, BeamFile) and "free" not in (source.beam.left, source.beam.right)
-        return [Location(key=())] if applies else []
+        return [Location()] if applies else []
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Force, from near buckling to strong tension."""

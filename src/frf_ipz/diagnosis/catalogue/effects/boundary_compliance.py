@@ -9,7 +9,8 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter, grid
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, grid
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.kinds.beam import BeamFile
@@ -40,7 +41,7 @@ class BoundaryCompliance(Effect):
         for end, node in (("left", 1), ("right", source.beam.elements + 1)):
             supported = SUPPORTED[getattr(source.beam, end)]
             ways = [supported] if len(supported) < 2 else [(supported[0],), (supported[1],), supported]
-            locations += [Location(key=(end, way), entries={"end": end, "nodes": [node]}) for way in ways if way]
+            locations += [Location(end=end, nodes=(node,), directions=way) for way in ways if way]
         return locations
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
@@ -51,14 +52,13 @@ class BoundaryCompliance(Effect):
             Parameter(
                 name=NAMES[way], low=BOUNDS[way][0] * scale[way], high=BOUNDS[way][1] * scale[way], neutral=np.inf
             )
-            for way in _ways(location)
+            for way in location.directions
         )
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Release the fixed DOFs and put springs there."""
         model = context.model
-        node = model.source.beam.elements + 1 if location.key[0] == "right" else 1  # type: ignore[attr-defined]  # a beam
-        released = tuple(model.full_index(Dof(node, way)) for way in _ways(location))
+        released = tuple(model.full_index(Dof(location.node, way)) for way in location.directions)
         size = len(model.all_dofs)
 
         def change(values: FloatArray) -> Change:
@@ -77,7 +77,7 @@ class BoundaryCompliance(Effect):
         return [
             alternative
             for alternative in self.locations(context)
-            if alternative.key[0] == location.key[0] and alternative.key != location.key
+            if alternative.end == location.end and alternative != location
         ]
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
@@ -85,12 +85,7 @@ class BoundaryCompliance(Effect):
         del context
         ways = {ROTATION: ("N m/rad", "in rotation"), TRANSLATION: ("N/m", "in translation")}
         springs = " and ".join(f"{value.in_words(ways[name][0])} {ways[name][1]}" for name, value in values.items())
-        return f"The {location.key[0]} end is not rigidly held: its support has a stiffness of {springs}."
-
-
-def _ways(location: Location) -> tuple[str, ...]:
-    ways = location.key[1]
-    return ways if isinstance(ways, tuple) else ()
+        return f"The {location.end} end is not rigidly held: its support has a stiffness of {springs}."
 
 
 def _bending(context: ModelContext) -> tuple[float, float]:

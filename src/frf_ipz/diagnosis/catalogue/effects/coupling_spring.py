@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter, Signature
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Signature
 from frf_ipz.diagnosis.catalogue.effects.grounded_spring import floating, is_floating
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.diagnosis.model.motion import Motion, make_unit_stiffness
+from frf_ipz.dofs import Dof
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -65,7 +67,7 @@ class CouplingSpring(Effect):
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """One end at a node beside; in a row also both ends, for they make up for each other."""
-        first, second, direction = int(str(location.key[0])), int(str(location.key[1])), str(location.key[2])
+        (first, second), direction = location.nodes, location.direction
         pairs = [(neighbour, second) for neighbour in context.neighbouring_nodes(first, direction)]
         pairs += [(first, neighbour) for neighbour in context.neighbouring_nodes(second, direction)]
         if context.model.kind in ("beam", "lumped"):
@@ -77,7 +79,7 @@ class CouplingSpring(Effect):
 
     def surroundings(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Both ends at any nodes near: along a line of such pairs, each is nearly as good as the next."""
-        first, second, direction = int(str(location.key[0])), int(str(location.key[1])), str(location.key[2])
+        (first, second), direction = location.nodes, location.direction
         firsts, seconds = ([node, *context.neighbouring_nodes(node, direction, FURTHEST)] for node in (first, second))
         return _make_locations(
             context, location, [pair for pair in product(firsts, seconds) if pair != (first, second)]
@@ -86,7 +88,7 @@ class CouplingSpring(Effect):
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, and between what."""
         stiffness = values["stiffness_N_m"]
-        first, second = (context.describe_node(int(str(node))) for node in location.key[:2])
+        first, second = map(context.describe_node, location.nodes)
         return f"A spring of {stiffness.in_words('N/m')} joins {first} and {second}; the model lacks it."
 
 
@@ -97,13 +99,12 @@ def _stride(context: ModelContext) -> int:
 
 
 def _make_location(first: int, second: int, direction: str) -> Location:
-    low, high = sorted((first, second))
-    return Location(key=(low, high, direction), entries={"nodes": [low, high]})
+    return Location(nodes=(min(first, second), max(first, second)), directions=(direction,))
 
 
 def _make_locations(context: ModelContext, template: Location, pairs: Sequence[tuple[int, int]]) -> list[Location]:
     """Make locations of pairs of nodes, floating where the template is."""
-    locations = [_make_location(a, b, str(template.key[2])) for a, b in pairs if a != b and _is_new(context, a, b)]
+    locations = [_make_location(a, b, template.direction) for a, b in pairs if a != b and _is_new(context, a, b)]
     return [floating(location) for location in locations] if is_floating(template) else locations
 
 
@@ -115,6 +116,5 @@ def _is_new(context: ModelContext, first: int, second: int) -> bool:
 
 
 def _motion(context: ModelContext, location: Location) -> Motion:
-    first, second, direction = location.key[:3]
-    ends = [context.motion_at(node, direction) for node in (second, first)]
-    return ends[0] - ends[1]
+    first, second = (context.motion(Dof(node, location.direction)) for node in location.nodes)
+    return second - first

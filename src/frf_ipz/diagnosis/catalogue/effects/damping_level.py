@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import NO_CHANGE, Change
 from frf_ipz.diagnosis.model.modes import MIN_RATIO, modify_structure
 
@@ -30,7 +31,7 @@ class DampingLevel(Effect):
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Everywhere."""
         del context
-        return [Location(key=())]
+        return [Location()]
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Damping ratio."""

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ class GlobalStiffness(Effect):
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Everywhere."""
         del context
-        return [Location(key=())]
+        return [Location()]
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Real stiffness over the model's."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,14 +11,14 @@ import numpy as np
 from frf_ipz.diagnosis.catalogue.effect import (
     Builder,
     Effect,
-    Location,
     Parameter,
     Signature,
     list_neighbouring_nodes,
     list_node_locations,
 )
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
-from frf_ipz.diagnosis.model.motion import Motion, make_unit_stiffness
+from frf_ipz.diagnosis.model.motion import make_unit_stiffness
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -37,45 +38,36 @@ class GroundedSpring(Effect):
         """Every node that moves; not where a lumped model has such a spring already, which is then stiffer."""
         springs = [part for part in context.model.parts if part.kind == "spring"]
         grounded = {node for part in springs if 0 in part.nodes for node in part.nodes}
-        return [location for location in list_node_locations(context) if location.key[0] not in grounded]
+        return [location for location in list_node_locations(context) if location.node not in grounded]
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Stiffness."""
-        scale = context.stiffness_against(_motion(context, location))
+        scale = context.stiffness_against(context.motion(location.dof))
         return (Parameter(name="stiffness_N_m", low=SOFTEST * scale, high=STIFFEST * scale),)
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Add it to the diagonal."""
-        unit = make_unit_stiffness(_motion(context, location), len(context.model.all_dofs))
+        unit = make_unit_stiffness(context.motion(location.dof), len(context.model.all_dofs))
         floats = is_floating(location)
         return lambda values: Change(stiffness=values[0] * unit, floating=floats)
 
     def signature(self, context: ModelContext, location: Location) -> Signature | None:
         """Give a constant stiffness."""
         return Signature(
-            motion=_motion(context, location),
+            motion=context.motion(location.dof),
             shapes=np.ones((1, len(context.contour)), complex),
             values=np.ones((1, 1)),
         )
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside; what a free structure touches may also float with it."""
-        if is_floating(location):
-            return [
-                floating(neighbour)
-                for neighbour in list_neighbouring_nodes(
-                    context, Location(key=location.key[:2], entries=location.entries)
-                )
-            ]
-        return [
-            *list_neighbouring_nodes(context, location),
-            *([floating(location)] if context.basis.modes.n_rigid else []),
-        ]
+        beside = list_neighbouring_nodes(context, location)
+        return [*beside, *([floating(location)] if context.basis.modes.n_rigid and not is_floating(location) else [])]
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, and where."""
         stiffness = values["stiffness_N_m"]
-        where = context.describe_node(int(str(location.key[0])))
+        where = context.describe_node(location.node)
         return (
             f"A spring of {stiffness.in_words('N/m')} holds {where} "
             f"to {'something that hangs as softly as the structure' if is_floating(location) else 'the ground'}; "
@@ -96,7 +88,7 @@ def floating(location: Location) -> Location:
     Location
         The same, floating.
     """
-    return Location(key=(*location.key, FLOATING), entries=location.entries)
+    return replace(location, form=FLOATING)
 
 
 def is_floating(location: Location) -> bool:
@@ -112,9 +104,4 @@ def is_floating(location: Location) -> bool:
     bool
         True for one that `floating` made.
     """
-    return FLOATING in location.key
-
-
-def _motion(context: ModelContext, location: Location) -> Motion:
-    node, direction = location.key[:2]
-    return context.motion_at(node, direction)
+    return location.form == FLOATING

@@ -11,14 +11,13 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import (
     Builder,
     Effect,
-    Location,
     Parameter,
     Signature,
     list_neighbouring_nodes,
     list_node_locations,
 )
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Attachment, Change
-from frf_ipz.diagnosis.model.motion import Motion
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -40,12 +39,12 @@ class LocalDamper(Effect):
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Damping constant."""
-        scale = context.stiffness_against(_motion(context, location)) / (2 * np.pi * context.band_hz[0])
+        scale = context.stiffness_against(context.motion(location.dof)) / (2 * np.pi * context.band_hz[0])
         return (Parameter(name="damping_Ns_m", low=WEAKEST * scale, high=STRONGEST * scale),)
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Attach it."""
-        motion = _motion(context, location).dense(len(context.model.all_dofs))[:, None]
+        motion = context.motion(location.dof).dense(len(context.model.all_dofs))[:, None]
         none = np.zeros((1, 1))
 
         def change(values: FloatArray) -> Change:
@@ -58,7 +57,7 @@ class LocalDamper(Effect):
 
     def signature(self, context: ModelContext, location: Location) -> Signature:
         """Proportional to s."""
-        return Signature(motion=_motion(context, location), shapes=context.contour[None], values=np.ones((1, 1)))
+        return Signature(motion=context.motion(location.dof), shapes=context.contour[None], values=np.ones((1, 1)))
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside."""
@@ -67,12 +66,5 @@ class LocalDamper(Effect):
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how much, and where."""
         damping = values["damping_Ns_m"]
-        return (
-            f"A damper of {damping.in_words('N s/m')} acts between "
-            f"{context.describe_node(int(str(location.key[0])))} and the ground."
-        )
-
-
-def _motion(context: ModelContext, location: Location) -> Motion:
-    node, direction = location.key
-    return context.motion_at(node, direction)
+        where = context.describe_node(location.node)
+        return f"A damper of {damping.in_words('N s/m')} acts between {where} and the ground."

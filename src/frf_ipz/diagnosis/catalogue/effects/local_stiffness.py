@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter, Signature
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Signature
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.diagnosis.model.motion import Motion
 from frf_ipz.dofs import Dof
@@ -25,7 +26,7 @@ LENGTHS = (1, 2, 4, 8, 16)  # of segments of elements that are searched; others 
 USUAL_LENGTH, WITHIN = 0.04, 2.0  # of the whole: a crack takes away stiffness over about three heights; to a factor
 MIN_CHANGE = 0.03  # of stiffness: below, all changes are as likely
 LONGEST = 4  # of the whole, as a divisor: longer segments are not local
-KEYS = {"element": "elements", "spring": "springs", "group": "groups"}
+KINDS = ("element", "spring", "group")
 
 
 class LocalStiffness(Effect):
@@ -36,11 +37,11 @@ class LocalStiffness(Effect):
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Segments of some lengths; every spring; every group."""
-        parts = [part for part in context.model.parts if part.kind in KEYS and _has_stiffness(part)]
+        parts = [part for part in context.model.parts if part.kind in KINDS and _has_stiffness(part)]
         elements = [part for part in parts if part.kind == "element"]
-        locations = [Location(key=(part.kind, part.name), entries={KEYS[part.kind]: [part.name]}) for part in parts]
         if not elements:
-            return locations
+            names = [(part.kind == "spring", (part.name,)) for part in parts]
+            return [Location(springs=name) if is_spring else Location(groups=name) for is_spring, name in names]
         return [
             _segment(first, first + length - 1)
             for length in LENGTHS
@@ -56,7 +57,7 @@ class LocalStiffness(Effect):
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Scale the parts' share of the matrix."""
-        _, stiffness = part_matrices(context.model, str(location.key[0]), _names(location))
+        _, stiffness = part_matrices(context.model, _kind(location), _names(location))
         return lambda values: Change(stiffness=(values[0] - 1) * stiffness)
 
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
@@ -66,19 +67,18 @@ class LocalStiffness(Effect):
 
     def signature(self, context: ModelContext, location: Location) -> Signature | None:
         """Bend a segment with constant curvature, extend a spring; a group has no such single motion."""
-        kind = location.key[0]
-        if kind == "group":
+        if location.groups:
             return None
-        motion, stiffness = (_curvature if kind == "element" else _extension)(context, location)
+        motion, stiffness = (_curvature if location.elements else _extension)(context, location)
         changes = (START_VALUES - 1) * stiffness
         shapes = np.repeat(changes[:, None] + 0j, len(context.contour), 1)
         return Signature(motion=motion, shapes=shapes, values=START_VALUES[:, None], amplitudes=np.ones(1))
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Segments that begin or end an element earlier or later; all other springs or groups are searched anyway."""
-        if location.key[0] != "element":
+        if not location.elements:
             return []
-        first, last = int(str(location.key[1])), int(str(location.key[2]))
+        first, last = location.elements
         total = sum(part.kind == "element" for part in context.model.parts)
         stride = max((last - first + 1) // 3, 2)
         moves = {(a, b) for step in (1, stride) for a in (-step, 0, step) for b in (-step, 0, step)} - {(0, 0)}
@@ -92,11 +92,11 @@ class LocalStiffness(Effect):
         is preferred, whose change has the larger uncertainty.
         """
         by_size = -float(np.log(max(abs(values[0] - 1), MIN_CHANGE)))
-        if location.key[0] != "element":
+        if not location.elements:
             return by_size
+        first, last = location.elements
         usual = max(USUAL_LENGTH * sum(part.kind == "element" for part in context.model.parts), 1.0)
-        length = int(str(location.key[2])) - int(str(location.key[1])) + 1
-        return by_size - 0.5 * float(np.log(length / usual) / np.log(WITHIN)) ** 2
+        return by_size - 0.5 * float(np.log((last - first + 1) / usual) / np.log(WITHIN)) ** 2
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which part, and by how much."""
@@ -113,19 +113,24 @@ def _has_stiffness(part: Part) -> bool:
 
 
 def _segment(first: int, last: int) -> Location:
-    return Location(key=("element", first, last), entries={"elements": [first, last]})
+    return Location(elements=(first, last))
+
+
+def _kind(location: Location) -> str:
+    return next(kind for kind in KINDS if f"{kind}s" in location)
 
 
 def _names(location: Location) -> list[str]:
-    if location.key[0] != "element":
-        return [str(location.key[1])]
-    return [str(number) for number in range(int(str(location.key[1])), int(str(location.key[2])) + 1)]
+    if not location.elements:
+        return [*location.springs, *location.groups]
+    first, last = location.elements
+    return [str(number) for number in range(first, last + 1)]
 
 
 def _name_part(context: ModelContext, location: Location) -> str:
-    if location.key[0] != "element":
-        return f"The {location.key[0]} '{location.key[1]}' is"
-    first, last = int(str(location.key[1])), int(str(location.key[2]))
+    if not location.elements:
+        return f"The {_kind(location)} '{_names(location)[0]}' is"
+    first, last = location.elements
     ends = [float(context.positions[node][0]) for node in (first, last + 1)]
     what = f"Element {first} is" if first == last else f"The elements {first} to {last} are"
     return f"{what[:-3] if first == last else what[:-4]} (x = {ends[0]:.3f} to {ends[1]:.3f} m) {what.split()[-1]}"
@@ -133,7 +138,7 @@ def _name_part(context: ModelContext, location: Location) -> str:
 
 def _curvature(context: ModelContext, location: Location) -> tuple[Motion, float]:
     """Rotation of a segment's right end against its left one, and the bending stiffness against that."""
-    first, last = int(str(location.key[1])), int(str(location.key[2]))
+    first, last = location.elements
     model = context.model
     rotations = tuple(model.full_index(Dof(node, "ry")) for node in (last + 1, first))
     parts = {part.name: part for part in model.parts if part.kind == "element"}
@@ -145,5 +150,5 @@ def _curvature(context: ModelContext, location: Location) -> tuple[Motion, float
 
 
 def _extension(context: ModelContext, location: Location) -> tuple[Motion, float]:
-    part = next(part for part in context.model.parts if part.kind == "spring" and part.name == location.key[1])
-    return Motion(rows=tuple(part.indices.tolist()), weights=(-1.0, 1.0)), float(part.stiffness[1, 1])
+    part = context.spring_at(location)
+    return context.extension(part), float(part.stiffness[1, 1])

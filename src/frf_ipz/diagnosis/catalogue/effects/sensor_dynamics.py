@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 
 if TYPE_CHECKING:
@@ -29,15 +30,15 @@ class SensorDynamics(Effect):
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every channel, with a high-pass or a low-pass."""
         return [
-            Location(key=(channel, kind), entries={"channels": [channel]}, text={"kind": kind})
+            Location.on_channel(channel, form=kind)
             for channel in context.layout.channels
             for kind in (HIGHPASS, LOWPASS)
         ]
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Corner."""
-        low, high = (bound * _edge(context, location) for bound in BOUNDS[str(location.key[1])])
-        neutral = 0.0 if location.key[1] == HIGHPASS else np.inf
+        low, high = (bound * _edge(context, location) for bound in BOUNDS[location.form])
+        neutral = 0.0 if location.form == HIGHPASS else np.inf
         return (Parameter(name="corner_hz", low=low, high=high, neutral=neutral),)
 
     def build(self, context: ModelContext, location: Location) -> Builder:
@@ -47,18 +48,21 @@ class SensorDynamics(Effect):
 
     def chain(self, location: Location) -> Builder:
         """Do the same for any structure."""
-        channel, kind = str(location.key[0]), str(location.key[1])
-        return lambda values: Change(channels={channel: lambda s: first_order(s, kind, values[0])})
+        return lambda values: Change(channels={location.channel: lambda s: first_order(s, location.form, values[0])})
+
+    def texts(self, location: Location) -> Mapping[str, str]:
+        """Give the kind of the filter."""
+        return {"kind": location.form}
 
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """From outside the band to within."""
-        return START_VALUES[str(location.key[1])][:, None] * _edge(context, location)
+        return START_VALUES[location.form][:, None] * _edge(context, location)
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which channel, which filter."""
         del context
         corner = values["corner_hz"]
-        return f"The channel '{location.key[0]}' has a {location.key[1]} with its corner at {corner.in_words('Hz')}."
+        return f"The channel '{location.channel}' has a {location.form} with its corner at {corner.in_words('Hz')}."
 
 
 def first_order(s: ComplexArray, kind: str, corner_hz: float) -> ComplexArray:
@@ -83,4 +87,4 @@ def first_order(s: ComplexArray, kind: str, corner_hz: float) -> ComplexArray:
 
 
 def _edge(context: ModelContext, location: Location) -> float:
-    return context.band_hz[0] if location.key[1] == HIGHPASS else context.band_hz[1]
+    return context.band_hz[0] if location.form == HIGHPASS else context.band_hz[1]

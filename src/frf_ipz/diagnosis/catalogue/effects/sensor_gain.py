@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 
 if TYPE_CHECKING:
@@ -29,15 +30,11 @@ class SensorGain(Effect):
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every channel, with either sign."""
-        return [
-            Location(key=(channel, sign), entries={"channels": [channel]})
-            for channel in context.layout.channels
-            for sign in (1, -1)
-        ]
+        return [Location.on_channel(channel, sign=sign) for channel in context.layout.channels for sign in (1, -1)]
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Give the size of the ratio."""
-        neutral = 1.0 if location.key[1] == 1 else 0.0
+        neutral = 1.0 if location.sign == 1 else 0.0
         tolerance = context.options.gain_tolerance
         return (Parameter(name="gain_ratio", low=BOUNDS[0], high=BOUNDS[1], neutral=neutral, tolerance=tolerance),)
 
@@ -48,8 +45,9 @@ class SensorGain(Effect):
 
     def chain(self, location: Location) -> Builder:
         """Do the same for any structure."""
-        channel, sign = str(location.key[0]), float(str(location.key[1]))
-        return lambda values: Change(channels={channel: lambda s: np.full(len(s), sign * values[0] + 0j)})
+        return lambda values: Change(
+            channels={location.channel: lambda s: np.full(len(s), location.sign * values[0] + 0j)}
+        )
 
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """From much less to much more."""
@@ -59,7 +57,7 @@ class SensorGain(Effect):
     def report_value(self, location: Location, name: str, value: float) -> float:
         """Give the ratio its sign."""
         del name
-        return value * float(str(location.key[1]))
+        return value * location.sign
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which channel, and by how much."""
@@ -67,4 +65,4 @@ class SensorGain(Effect):
         ratio = values["gain_ratio"]
         sign = " and has the wrong sign" if ratio.value < 0 else ""
         size = ratio.in_words("times", -1.0 if ratio.value < 0 else 1.0)
-        return f"The channel '{location.key[0]}' shows {size} the true signal{sign}."
+        return f"The channel '{location.channel}' shows {size} the true signal{sign}."

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter, Reading
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Reading, list_neighbouring_nodes
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.diagnosis.model.motion import Motion
 from frf_ipz.dofs import Dof
@@ -25,7 +26,7 @@ class SensorMisplaced(Effect):
         """Every other node for every channel that stays at one node; a port has none."""
         channels = [channel for channel, _ in context.layout.outputs]
         return [
-            _make_location(channel, candidate.node)
+            Location(channels=(channel,), nodes=(candidate.node,), directions=(dof.direction,))
             for channel, dof in context.layout.outputs
             if channels.count(channel) == 1 and isinstance(dof, Dof)
             for candidate in context.moving_dofs
@@ -44,37 +45,25 @@ class SensorMisplaced(Effect):
 
     def chain(self, location: Location) -> Builder:
         """Do the same for any structure."""
-        change = Change(moved={str(location.key[0]): int(str(location.key[1]))})
+        change = Change(moved={location.channel: location.node})
         return lambda _: change
 
     def reading(self, context: ModelContext, location: Location) -> Reading:
         """Read the same direction at the other node."""
-        channel, node = str(location.key[0]), int(str(location.key[1]))
-        dof = _nominal_dof(context, channel)
-        row = context.model.full_index(Dof(node, dof.direction))
-        return Reading(channel=channel, motion=Motion(rows=(row,), weights=(float(dof.sign),)))
+        dof, row = _nominal_dof(context, location.channel), context.model.full_index(location.dof)
+        return Reading(channel=location.channel, motion=Motion(rows=(row,), weights=(float(dof.sign),)))
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside."""
-        channel, node = str(location.key[0]), int(str(location.key[1]))
-        dof = _nominal_dof(context, channel)
-        return [
-            _make_location(channel, neighbour)
-            for neighbour in context.neighbouring_nodes(node, dof.direction)
-            if neighbour != dof.node
-        ]
+        stated = _nominal_dof(context, location.channel).node
+        return [beside for beside in list_neighbouring_nodes(context, location) if beside.node != stated]
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say which sensor, and where it is."""
         del values
-        channel, node = str(location.key[0]), int(str(location.key[1]))
-        dof = _nominal_dof(context, channel)
-        return f"The sensor of '{channel}' sits at {context.describe_node(node)}, not at node {dof.node}."
+        stated, where = _nominal_dof(context, location.channel).node, context.describe_node(location.node)
+        return f"The sensor of '{location.channel}' sits at {where}, not at node {stated}."
 
 
 def _nominal_dof(context: ModelContext, channel: str) -> Dof:
     return next(dof for name, dof in context.layout.outputs if name == channel and isinstance(dof, Dof))
-
-
-def _make_location(channel: str, node: int) -> Location:
-    return Location(key=(channel, node), entries={"channels": [channel], "nodes": [node]})

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.fe.beam_models import with_formulation
 from frf_ipz.fe.kinds.beam import BeamFile
@@ -27,7 +28,7 @@ class ShearRotaryInertia(Effect):
         """Return a beam that was modelled by Euler-Bernoulli."""
         source = context.model.source
         applies = isinstance(source, BeamFile) and source.beam.formulation == "euler-bernoulli"
-        return [Location(key=())] if applies else []
+        return [Location()] if applies else []
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """None: dimensions and material are known."""

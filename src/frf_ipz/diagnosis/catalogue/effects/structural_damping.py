@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class StructuralDamping(Effect):
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Everywhere, in four forms."""
         del context
-        return [Location(key=key) for key in ((), (CAUSAL,), (KEEPING_MODES,), (OF_MODES,))]
+        return [Location(form=form) for form in ("", CAUSAL, KEEPING_MODES, OF_MODES)]
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Loss factor."""
@@ -45,11 +46,11 @@ class StructuralDamping(Effect):
 
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Give it to the stiffness, or half of it to the ratio of each mode."""
-        if location.key == (OF_MODES,):
+        if location.form == OF_MODES:
             return lambda values: Change(added_ratio=float(values[0]) / 2)
-        if location.key == (KEEPING_MODES,):
+        if location.form == KEEPING_MODES:
             return lambda values: Change(loss_factor=float(values[0]), keeps_modes=True)
-        middle = 2 * np.pi * float(np.sqrt(context.band_hz[0] * context.band_hz[1])) if location.key else 0.0
+        middle = 2 * np.pi * float(np.sqrt(context.band_hz[0] * context.band_hz[1])) if location.form else 0.0
         return lambda values: Change(loss_factor=float(values[0]), reference_rad_s=middle)
 
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
@@ -60,7 +61,7 @@ class StructuralDamping(Effect):
     def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
         """Half a loss factor for each mode is what another level of damping looks like, and says less plainly."""
         del context, values
-        return LESS_LIKELY if location.key == (OF_MODES,) else 0.0
+        return LESS_LIKELY if location.form == OF_MODES else 0.0
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how much."""

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Location, Parameter
+from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 
 if TYPE_CHECKING:
@@ -29,9 +30,7 @@ class TimeDelay(Effect):
         """Every channel, and all sensors together."""
         sensors = tuple(dict.fromkeys(channel for channel, _ in context.layout.outputs))
         late = [(channel,) for channel in context.layout.channels]
-        return [
-            Location(key=channels, entries={"channels": list(channels)}) for channels in dict.fromkeys([*late, sensors])
-        ]
+        return [Location(channels=channels) for channels in dict.fromkeys([*late, sensors])]
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Delay."""
@@ -46,10 +45,9 @@ class TimeDelay(Effect):
 
     def chain(self, location: Location) -> Builder:
         """Do the same for any structure."""
-        channels = [str(channel) for channel in location.key]
 
         def change(values: FloatArray) -> Change:
-            return Change(channels=dict.fromkeys(channels, lambda s: np.exp(-s * values[0])))
+            return Change(channels=dict.fromkeys(location.channels, lambda s: np.exp(-s * values[0])))
 
         return change
 
@@ -63,6 +61,6 @@ class TimeDelay(Effect):
         del context
         delay = values["delay_s"]
         late = f"late by {delay.in_words('us', 1e6)}"
-        if len(location.key) == 1:
-            return f"The channel '{location.key[0]}' is {late}."
+        if len(location.channels) == 1:
+            return f"The channel '{location.channel}' is {late}."
         return f"All sensors together are {late}."

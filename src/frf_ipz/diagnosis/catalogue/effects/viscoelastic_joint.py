@@ -11,12 +11,12 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.catalogue.effect import (
     Builder,
     Effect,
-    Location,
     Parameter,
     Signature,
     list_neighbouring_nodes,
     list_node_locations,
 )
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Attachment, Change
 from frf_ipz.diagnosis.model.motion import Motion
 from frf_ipz.fe.kinds.beam import BeamFile
@@ -40,20 +40,17 @@ class ViscoelasticJoint(Effect):
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that moves, every spring, the rotation of every pinned end."""
-        at_nodes = [
-            Location(key=("node", *location.key), entries=location.entries) for location in list_node_locations(context)
-        ]
         springs = [part for part in context.model.parts if part.kind == "spring"]
         to_ground = {node for part in springs if 0 in part.nodes for node in part.nodes}
-        at_nodes = [location for location in at_nodes if location.key[1] not in to_ground]
-        at_springs = [Location(key=("spring", part.name), entries={"springs": [part.name]}) for part in springs]
+        at_nodes = [location for location in list_node_locations(context) if location.node not in to_ground]
+        at_springs = [Location(springs=(part.name,)) for part in springs]
         return at_nodes + at_springs + _ends(context)
 
     def parameters(self, context: ModelContext, location: Location) -> tuple[Parameter, ...]:
         """Stiffness and relaxation time."""
         scale = context.stiffness_against(motion_at(context, location))
         low, high = (2 * np.pi * edge for edge in context.band_hz)
-        name = "rotational_stiffness_Nm_rad" if location.key[0] == "end" else "stiffness_N_m"
+        name = "rotational_stiffness_Nm_rad" if location.end else "stiffness_N_m"
         return (
             Parameter(name=name, low=SOFTEST * scale, high=STIFFEST * scale),
             Parameter(name="relaxation_time_s", low=1 / (FASTEST * high), high=1 / (SLOWEST * low)),
@@ -92,29 +89,23 @@ class ViscoelasticJoint(Effect):
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
         """Nodes beside, and ends, which look like the nodes beside them; for others nothing."""
-        if location.key[0] != "node":
+        if location.end or location.springs:
             return []
-        inner = Location(key=location.key[1:], entries=location.entries)
-        beside = [
-            Location(key=("node", *other.key), entries=other.entries)
-            for other in list_neighbouring_nodes(context, inner)
-        ]
-        return beside + _ends(context)
+        return list_neighbouring_nodes(context, location) + _ends(context)
 
     def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
         """Joints sit at ends: one of them is as likely as one at any node between."""
         del values
-        return (
-            float(np.log(len(list_node_locations(context)) / len(_ends(context)))) if location.key[0] == "end" else 0.0
-        )
+        return float(np.log(len(list_node_locations(context)) / len(_ends(context)))) if location.end else 0.0
 
     def statement(self, context: ModelContext, location: Location, values: Mapping[str, Estimate]) -> str:
         """Say how stiff, how fast, where."""
-        where = {
-            "node": lambda: f"between {context.describe_node(int(str(location.key[1])))} and the ground",
-            "spring": lambda: f"across the spring '{location.key[1]}'",
-            "end": lambda: f"at the {location.key[1]} end, against its rotation,",
-        }[str(location.key[0])]()
+        if location.end:
+            where = f"at the {location.end} end, against its rotation,"
+        elif location.springs:
+            where = f"across the spring '{location.springs[0]}'"
+        else:
+            where = f"between {context.describe_node(location.node)} and the ground"
         name, stiffness = next(iter(values.items()))
         unit = "N m/rad" if name.startswith("rot") else "N/m"
         relaxation = values["relaxation_time_s"].in_words("ms", 1e3)
@@ -148,7 +139,7 @@ def _ends(context: ModelContext) -> list[Location]:
     if not isinstance(source, BeamFile):
         return []
     return [
-        Location(key=("end", end, node), entries={"end": end, "nodes": [node]})
+        Location(end=end, nodes=(node,), directions=("ry",))
         for end, node in (("left", 1), ("right", source.beam.elements + 1))
         if getattr(source.beam, end) == "pinned"
     ]
@@ -169,10 +160,4 @@ def motion_at(context: ModelContext, location: Location) -> Motion:
     Motion
         The motion of a node, the extension of a spring, the rotation of an end.
     """
-    kind = location.key[0]
-    if kind == "node":
-        return context.motion_at(*location.key[1:])
-    if kind == "end":
-        return context.motion_at(location.key[2], "ry")
-    part = next(part for part in context.model.parts if part.kind == "spring" and part.name == location.key[1])
-    return Motion(rows=tuple(part.indices.tolist()), weights=(-1.0, 1.0))
+    return context.extension(context.spring_at(location)) if location.springs else context.motion(location.dof)

@@ -7,13 +7,13 @@ change frequencies, damping and the mode shapes at sensors, inputs and the locat
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.diagnosis.location import Location
 from frf_ipz.dofs import TRANSLATIONS, AnyDof, Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.assembly import multiply
@@ -30,29 +30,6 @@ SUSPENSION_PART = 0.01  # of the first elastic frequency: that of a suspension o
 SUSPENSION_DAMPING = 0.03
 MAX_LOG_CHANGE = 20.0  # of a frequency or damping ratio: a step that diverged must not overflow
 LEAST_DAMPING_PART = 0.5  # of the stated damping: with less, more motion remains at the next impact
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Location:
-    """Where a law could act.
-
-    Parameters
-    ----------
-    entries : mapping
-        As in `diagnosis.json`.
-    ends : tuple of Dof
-        The DOF whose motion drives the law; for a spring its first and second end: second minus first drives it.
-    """
-
-    entries: Mapping[str, object]
-    ends: tuple[Dof, ...]
-
-    @property
-    def words(self) -> str:
-        """The location for a sentence."""
-        if len(self.ends) > 1:
-            return f"spring {self.ends[0].node}-{self.ends[1].node}"
-        return f"node {self.ends[0].node}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,6 +70,8 @@ class ModalModel:
         Excited DOFs.
     locations : tuple of Location
         Candidates.
+    ends : tuple of tuple of Dof
+        Of each: the DOF whose motion drives a law there; for a spring its two ends: second minus first drives it.
     at_sensors, at_inputs, at_locations : Points
         Signs of sensors and inputs are in the shapes.
     """
@@ -104,6 +83,7 @@ class ModalModel:
     sensors: tuple[Sensor, ...]
     inputs: tuple[AnyDof, ...]
     locations: tuple[Location, ...]
+    ends: tuple[tuple[Dof, ...], ...]
     at_sensors: Points
     at_inputs: Points
     at_locations: Points
@@ -112,6 +92,11 @@ class ModalModel:
     def n_modes(self) -> int:
         """Number of modes that are kept."""
         return len(self.omega_rad_s)
+
+    def describe_location(self, index: int) -> str:
+        """Name a location for a sentence."""
+        nodes = [end.node for end in self.ends[index]]
+        return f"spring {nodes[0]}-{nodes[1]}" if len(nodes) > 1 else f"node {nodes[0]}"
 
     def poles(self, nuisance_values: NuisanceValues) -> tuple[FloatArray, FloatArray]:
         """Natural frequencies, rad/s, and damping ratios of the real structure, (n_modes,) each."""
@@ -200,7 +185,8 @@ def make_modal_model(model: StructuralModel, observations: Observations) -> Moda
     omega, damping = _suspended_poles(model, low)
     rows = list(model.rows(measured).toarray())
     rows += [
-        _dof_weights(model, tuple(zip((1,) if len(p.ends) == 1 else (-1, 1), p.ends, strict=True))) for p in locations
+        _dof_weights(model, tuple(zip((1,) if len(ends) == 1 else (-1, 1), ends, strict=True)))
+        for ends in locations.values()
     ]
     points = _make_points(low, basis, np.array(rows))
     first, second = len(sensors), len(sensors) + len(inputs)
@@ -211,14 +197,15 @@ def make_modal_model(model: StructuralModel, observations: Observations) -> Moda
         n_rigid=low.n_rigid,
         sensors=sensors,
         inputs=inputs,
-        locations=locations,
+        locations=tuple(locations),
+        ends=tuple(locations.values()),
         at_sensors=_select_points(points, slice(0, first)),
         at_inputs=_select_points(points, slice(first, second)),
         at_locations=_select_points(points, slice(second, None)),
     )
 
 
-def find_locations(model: StructuralModel, directions: set[str]) -> tuple[Location, ...]:
+def find_locations(model: StructuralModel, directions: set[str]) -> dict[Location, tuple[Dof, ...]]:
     """List where a law could act: free translations in the directions of the test, and springs between two nodes.
 
     Parameters
@@ -230,8 +217,9 @@ def find_locations(model: StructuralModel, directions: set[str]) -> tuple[Locati
 
     Returns
     -------
-    tuple of Location
-        Nodes first. A spring from the ground is its node, and named besides: a law at either acts alike.
+    dict of Location to tuple of Dof
+        With their ends, nodes first. A spring from the ground is its node, and named besides: a law at either acts
+        alike.
 
     Raises
     ------
@@ -245,20 +233,21 @@ def find_locations(model: StructuralModel, directions: set[str]) -> tuple[Locati
     grounded = {
         part.nodes[1]: part.name for part in model.parts if part.kind == "spring" and tuple(part.nodes[:1]) == (0,)
     }
-    locations = [
+    locations: dict[Location, tuple[Dof, ...]] = {
         Location(
-            entries={"nodes": [dof.node]} | ({"springs": [grounded[dof.node]]} if dof.node in grounded else {}),
-            ends=(dof,),
-        )
+            nodes=(dof.node,),
+            springs=(grounded[dof.node],) if dof.node in grounded else (),
+            directions=(dof.direction,),
+        ): (dof,)
         for dof in moving
-    ]
+    }
     for part in model.parts:
         if part.kind == "spring" and len(part.nodes) == 2 and 0 not in part.nodes:
             for direction in sorted(directions):
                 ends = tuple(Dof(node, direction) for node in part.nodes)
                 if free.issuperset(ends):
-                    locations.append(Location(entries={"springs": [part.name]}, ends=ends))
-    return tuple(locations)
+                    locations[Location(springs=(part.name,), directions=(direction,))] = ends
+    return locations
 
 
 def _suspended_poles(model: StructuralModel, basis: ModalBasis) -> tuple[FloatArray, FloatArray]:

@@ -359,7 +359,7 @@ def make_nuisance_prior(
 def _location_shape_stds(modal_model: ModalModel, modes: IntArray, options: DiagnoseOptions) -> FloatArray:
     """Change of shapes at locations by uneven stiffness, as a part of the largest of all nodes, or of all springs."""
     shapes = np.abs(modal_model.at_locations.shapes[:, modes])
-    across = np.array([len(location.ends) > 1 for location in modal_model.locations])[:, None]
+    across = np.array([len(ends) > 1 for ends in modal_model.ends])[:, None]
     largest = [np.where(across == kind, shapes, 0.0).max(0) for kind in (False, True)]
     return np.asarray(UNEVEN * options.stiffness_tolerance * np.where(across, largest[1], largest[0]))
 
@@ -395,9 +395,9 @@ def _largest_slope(modal_model: ModalModel, dof: AnyDof, shape: FloatArray, mode
     position = dict(zip(geometry.nodes.tolist(), geometry.coordinates_m, strict=True))
     extent = float(np.ptp(geometry.coordinates_m, axis=0).max())
     distances = [
-        (float(np.linalg.norm(position[location.ends[0].node] - position[dof.node])), row)
-        for row, location in enumerate(modal_model.locations)
-        if len(location.ends) == 1 and location.ends[0].direction == dof.direction and location.ends[0].node != dof.node
+        (float(np.linalg.norm(position[ends[0].node] - position[dof.node])), row)
+        for row, ends in enumerate(modal_model.ends)
+        if len(ends) == 1 and ends[0].direction == dof.direction and ends[0].node != dof.node
     ]
     nearest = sorted(pair for pair in distances if pair[0] > 0)[:NEIGHBOURS]
     slopes = [np.abs(modal_model.at_locations.shapes[row, modes] - shape) / distance for distance, row in nearest]
