@@ -80,6 +80,27 @@ def pair_roots(fit: ModalFit, reduced_model: ReducedModel) -> Pairs:
     return Pairs(rows=tuple(rows), labels=fit.labels, warnings=tuple(_warnings(rows, pole_pairing, fit.labels)))
 
 
+def sure_partners(pairing: PolePairing) -> dict[int, int]:
+    """Give the measured poles that have a sure counterpart in a model.
+
+    Parameters
+    ----------
+    pairing : PolePairing
+        The assignment with its probabilities.
+
+    Returns
+    -------
+    dict of int to int
+        The model's pole of each.
+    """
+    partners = pairing.matching.partner.tolist()
+    return {
+        mode: partner
+        for mode, partner in enumerate(partners)
+        if partner >= 0 and pairing.probabilities[mode, partner] >= SURE
+    }
+
+
 def _pole_rows(fit: ModalFit, model: ModelPoles, pairing: PolePairing) -> list[Pair]:
     rows = []
     for mode in range(fit.n_modes):

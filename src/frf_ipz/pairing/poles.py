@@ -3,7 +3,8 @@
 The cost of a pair is a squared distance in standard deviations: of the frequency, after a factor common to all modes
 (a wrong modulus shifts them all), and of the mass-normalised amplitudes in every FRF, after one gain an FRF (its scale
 may not be known). Neither alone is enough: frequencies cannot separate two close modes, and shapes at few points
-cannot separate distant ones.
+cannot separate distant ones. A measured mode that is one with probability p only is as much less likely to be one of
+the model: a pair costs ``-2 ln p`` more, and no partner does not.
 """
 
 from __future__ import annotations
@@ -79,17 +80,37 @@ def pair_poles(fit: ModalFit, model: ModelPoles) -> PolePairing:
     if fit.modes_given is not None:
         amplitudes = np.asarray(fit.modes_given.as_model_has_them().shapes.T)
     shapes = _direction_costs(amplitudes, model.amplitudes)  # gains are not known yet, and of a stated shape never
+    doubt = -2 * np.log(np.maximum(probability_of_modes(fit), np.finfo(float).tiny))[:, None]
     for _ in range(ROUNDS if fit.labels else 0):
-        best, *_ = _tried(measured, computed, shapes, band)
+        best, *_ = _tried(measured, computed, shapes + doubt, band)
         gains = _gains(amplitudes, model.amplitudes, noise, best.matching.partner, fit.labels)
         shapes = _shape_costs(amplitudes, model.amplitudes, noise, gains, fit.labels)
-    tried = _tried(measured, computed, shapes, band)
+    tried = _tried(measured, computed, shapes + doubt, band)
     return PolePairing(
         matching=tried[0].matching,
         probabilities=mixed_probabilities(tried),
         costs=tried[0].costs,
         gains=gains,
     )
+
+
+def probability_of_modes(fit: ModalFit) -> FloatArray:
+    """Give the probability that a measured mode is one: that it is found again.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model.
+
+    Returns
+    -------
+    (n_modes,) array
+        1 where nothing is known of it, as of stated modes.
+    """
+    if len(fit.modes) != fit.n_modes or "found_again" not in fit.modes:
+        return np.ones(fit.n_modes)
+    found_again = np.asarray(fit.modes["found_again"], float)
+    return np.asarray(np.clip(np.nan_to_num(found_again, nan=1.0), 0.0, 1.0))
 
 
 def measured_amplitudes(fit: ModalFit) -> tuple[ComplexArray, FloatArray]:

@@ -91,6 +91,7 @@ def chain(
             pairs = modelling.pair(runner, fit, reduced)
             yield "pair"
             updated = modelling.update(runner, model, reduced, fit, pairs, corrected_by=diagnosis)
+            pairs = updated.pairs or pairs
             yield "update"
             prediction = outputs.predict(runner, updated, fit, frfs)
             with_causes = None if found is None else causes.predict_with_causes(runner, model, frfs, found, prediction)

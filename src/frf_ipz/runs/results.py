@@ -254,8 +254,9 @@ class Results:
 
     @cached_property
     def pairs(self) -> Pairs | None:
-        """Measured poles and zeros against those of the model."""
-        return self._load("pair")  # type: ignore[no-any-return]
+        """Measured poles and zeros against those of the model: what the update aimed at, where there is one."""
+        updated = self.updated_model
+        return self._load("pair") if updated is None or updated.pairs is None else updated.pairs
 
     @cached_property
     def updated_model(self) -> UpdatedModel | None:

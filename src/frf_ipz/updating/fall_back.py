@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.fe.response import compute_frfs
 from frf_ipz.late_imports import import_late
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.structure import ReducedModel
 else:
     pd = import_late("pandas")
 
@@ -45,20 +47,11 @@ def keep_if_better(updated: UpdatedModel, fit: ModalFit) -> UpdatedModel:
     """
     if not fit.labels or updated.model is updated.nominal or not len(updated.after):
         return updated
-    s: ComplexArray = np.asarray(2j * np.pi * fit.frequency_hz)
-    measured = np.abs(fit.model(s))
-    is_heard = measured > fit.value_std
-    if not is_heard.any():
-        return updated
-
-    def deviation_db(*, nominal: bool) -> float:
-        values = np.abs(updated.compute_frfs(fit.labels, s, nominal=nominal))[is_heard]
-        off_db = DB * np.log(np.maximum(values, np.finfo(float).tiny) / measured[is_heard])
-        return float(np.median(np.abs(off_db - np.median(off_db))))
-
-    before_db, after_db = deviation_db(nominal=True), deviation_db(nominal=False)
-    noise_db = float(np.median(DB * fit.value_std[is_heard] / measured[is_heard]))
-    if not after_db > before_db + noise_db:
+    before_db, after_db = (
+        median_deviation_db(fit, model, np.abs(scale.gains(fit.labels)))
+        for model, scale in ((updated.nominal, updated.nominal_scale), (updated.model, updated.scale))
+    )
+    if not after_db > before_db + _noise_db(fit):
         return updated
     nominal = updated.nominal
     return replace(
@@ -75,6 +68,40 @@ def keep_if_better(updated: UpdatedModel, fit: ModalFit) -> UpdatedModel:
             "pairs, measure at more points, or set a narrower [fit] band_hz",
         ),
     )
+
+
+def median_deviation_db(fit: ModalFit, model: ReducedModel, gains: FloatArray | None = None) -> float:
+    """Tell how far a model is from the measured FRFs.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model of the measured FRFs.
+    model : ReducedModel
+        The model.
+    gains : (n_frfs,) array, optional
+        Of the measured FRFs over it; 1 where they are left out.
+
+    Returns
+    -------
+    float
+        Median over all lines above their noise, beside one factor that all FRFs share, dB; 0 where there is none.
+    """
+    s: ComplexArray = np.asarray(2j * np.pi * fit.frequency_hz)
+    measured = np.abs(fit.model(s))
+    is_heard = measured > fit.value_std
+    if not is_heard.any():
+        return 0.0
+    values = np.abs(compute_frfs(model, fit.labels, s) * (1.0 if gains is None else gains))[is_heard]
+    off_db = DB * np.log(np.maximum(values, np.finfo(float).tiny) / measured[is_heard])
+    return float(np.median(np.abs(off_db - np.median(off_db))))
+
+
+def _noise_db(fit: ModalFit) -> float:
+    """Median of the noise of the fitted FRFs, on the lines that stand above it, dB."""
+    measured = np.abs(fit.model(np.asarray(2j * np.pi * fit.frequency_hz)))
+    is_heard = measured > fit.value_std
+    return float(np.median(DB * fit.value_std[is_heard] / measured[is_heard])) if is_heard.any() else 0.0
 
 
 def _around_nominal(updated: UpdatedModel) -> FloatArray:

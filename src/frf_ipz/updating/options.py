@@ -41,6 +41,9 @@ class UpdateOptions:
     expand : bool
         Where the update stays more than 1 dB off at the measured points, expand the measured shapes over the model in
         its place, if each point then follows better from the others (minimal-change).
+    pair_again : bool
+        Pair with the model after a first update too, where that gives measured modes other counterparts or sure ones,
+        and update further if that brings the model nearer to the measured FRFs (minimal-change).
     cross_sensitivities : bool
         Use the off-diagonal blocks of eq. (14) (``ipz``).
     ensemble : int
@@ -67,6 +70,7 @@ class UpdateOptions:
     delta: NotNegative = 1e-3
     delta_damping: NotNegative = 0.1
     expand: bool = True
+    pair_again: bool = True
     cross_sensitivities: bool = True
     ensemble: CountOrNone = 200
     seed: Seed = 0

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+from scipy import sparse
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.identification.root_covariance import RootCovariance
+from frf_ipz.identification.root_covariance import RootCovariance, pair_blocks
+from frf_ipz.pairing.poles import probability_of_modes
 from frf_ipz.updating.parameters import ParameterBasis
 from frf_ipz.updating.tracking import TargetRoots, nearest_roots
 
@@ -17,6 +19,25 @@ if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.structure import ReducedModel
+
+
+class PairAgain(Protocol):
+    """Pairs with models that have been updated; see `pairing_again`."""
+
+    @property
+    def pairs(self) -> Pairs:
+        """Pairs with the nominal model."""
+
+    def with_model(
+        self, problem: UpdateProblem, model: ReducedModel, pairs: Pairs, values: ComplexArray
+    ) -> tuple[Pairs, UpdateProblem] | None:
+        """Pair with an updated model; None where all measured poles keep their counterparts."""
+
+    def deviation_db(self, model: ReducedModel) -> float:
+        """Tell how far a model is from the measured FRFs."""
+
+    def named_before(self, again: Pairs, nominal: ReducedModel, values: ComplexArray) -> Pairs:
+        """Name pairs with an updated model by the roots of the model before."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,6 +60,8 @@ class UpdateProblem:
         Each target in words.
     basis : ParameterBasis, optional
         Parameters chosen by a diagnosis, or those of the FE model's parts; None for the method's own generic ones.
+    pair_again : PairAgain, optional
+        Pairs with a model that has been updated; None where the pairs are to stand.
     """
 
     model: ReducedModel
@@ -49,6 +72,7 @@ class UpdateProblem:
     frf: IntArray
     names: tuple[str, ...]
     basis: ParameterBasis | None = None
+    pair_again: PairAgain | None = None
 
     @property
     def frfs(self) -> tuple[int, ...]:
@@ -117,7 +141,7 @@ def make_problem(model: ReducedModel, fit: ModalFit, pairs: Pairs, basis: Parame
         labels=fit.labels,
         values=np.array([pair.measured_value for pair in targets], complex),
         computed=np.array([pair.computed_value for pair in targets], complex),
-        covariance=_selected(fit.covariance, parts),
+        covariance=_as_often_as_found(_selected(fit.covariance, parts), indices, probability_of_modes(fit)),
         frf=np.array([pair.frf for pair in targets], int),
         names=tuple(_name(pair.kind, pair.frf, pair.measured_value, fit) for pair in targets),
         basis=basis,
@@ -126,6 +150,22 @@ def make_problem(model: ReducedModel, fit: ModalFit, pairs: Pairs, basis: Parame
 
 def _selected(covariance: FloatArray | RootCovariance, parts: IntArray) -> FloatArray | RootCovariance:
     return covariance.select(parts) if isinstance(covariance, RootCovariance) else covariance[np.ix_(parts, parts)]
+
+
+def _as_often_as_found(
+    covariance: FloatArray | RootCovariance, indices: IntArray, probability: FloatArray
+) -> FloatArray | RootCovariance:
+    """Let a mode that is found again with probability p tell p times as much: its own variance is divided by p."""
+    is_pole = indices < len(probability)
+    share = np.ones(len(indices))
+    share[is_pole] = np.maximum(probability[indices[is_pole]], np.finfo(float).eps)
+    added = (1 / share - 1)[:, None, None] * pair_blocks(covariance)
+    if not added.any():
+        return covariance
+    blocks = sparse.block_diag(tuple(added), format="csr")
+    if isinstance(covariance, RootCovariance):
+        return replace(covariance, blocks=sparse.csr_array(covariance.blocks + blocks))
+    return np.asarray(covariance + blocks.toarray())
 
 
 def _name(kind: str, frf: int, value: complex, fit: ModalFit) -> str:

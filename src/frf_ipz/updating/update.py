@@ -24,6 +24,7 @@ from frf_ipz.structure import ReducedModel, StructuralModel
 from frf_ipz.updating import methods
 from frf_ipz.updating.fall_back import keep_if_better
 from frf_ipz.updating.options import UpdateOptions
+from frf_ipz.updating.pairing_again import PairingAgain
 from frf_ipz.updating.parameters import ParameterBasis, make_structural_basis
 from frf_ipz.updating.position_uncertainty import with_position_uncertainty
 from frf_ipz.updating.problem import UpdateProblem, make_problem
@@ -139,9 +140,15 @@ def update_model(
     if basis is None and fe_model is not None:
         basis = make_structural_basis(fe_model, reduced_model, mass=chosen.mass)
     paired = pairs or pair_roots(fit, reduced_model)
-    problem = make_problem(reduced_model, fit, paired, basis)
-    problem = replace(problem, covariance=with_position_uncertainty(problem, position_uncertainty))
+
+    def targets_of(chosen_pairs: Pairs, model: ReducedModel) -> UpdateProblem:
+        targets = make_problem(model, fit, chosen_pairs, basis)
+        return replace(targets, covariance=with_position_uncertainty(targets, position_uncertainty))
+
+    again = PairingAgain(fit=fit, pairs=paired, make_problem=targets_of)
+    problem = replace(targets_of(paired, reduced_model), pair_again=again if chosen.pair_again else None)
     updated = with_free_rigid_bodies(cast("Method", module).update(problem, chosen, progress))
+    paired = updated.pairs or paired
     scaled = _with_scales(updated, fit, paired)
     kept = keep_if_better(scaled, fit)
     if kept is not scaled:

@@ -14,6 +14,7 @@ from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.rigid_motions import meet_no_force, without_force
+from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.structure import ReducedModel
 from frf_ipz.updating.expansion import ShapeExpansion
 from frf_ipz.updating.scale import MeasuredScale
@@ -90,6 +91,9 @@ class UpdatedModel(Tabulated, Drawn):
     scale, nominal_scale : MeasuredScale
         Gains of the measured FRFs over the updated and the nominal model, where the test does not know its scale;
         else gains of 1 whose draws carry the doubt of the model's mass.
+    pairs : Pairs, optional
+        The targets, where pairing with the model after a first update has changed them: named by the roots of the
+        model before it.
     expansion : ShapeExpansion, optional
         What is known of it where `model` holds the measured modes, with their shapes expanded over the nominal model,
         as no change of its matrices meets the measurement.
@@ -130,6 +134,7 @@ class UpdatedModel(Tabulated, Drawn):
     parts: pd.DataFrame = field(default_factory=lambda: pd.DataFrame())
     scale: MeasuredScale = field(default_factory=MeasuredScale)
     nominal_scale: MeasuredScale = field(default_factory=MeasuredScale)
+    pairs: Pairs | None = None
     expansion: ShapeExpansion | None = None
 
     def __repr__(self) -> str:
@@ -203,17 +208,37 @@ def with_free_rigid_bodies(updated: UpdatedModel) -> UpdatedModel:
     nominal = updated.nominal
     if not nominal.rigid.size or updated.model is nominal:
         return updated
-    unstrained, undamped = (
-        nominal.rigid[:, meet_no_force(matrix, nominal.rigid)] for matrix in (nominal.stiffness, nominal.damping)
-    )
-
-    def free(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return mass, without_force(damping, mass, undamped), without_force(stiffness, mass, unstrained)
-
     model = updated.model
-    mass, damping, stiffness = free(model.mass, model.damping, model.stiffness)
+    mass, damping, stiffness = free_matrices(nominal, model.mass, model.damping, model.stiffness)
     return replace(
         updated,
         model=replace(model, mass=mass, damping=damping, stiffness=stiffness),
-        ensemble=np.array([free(*member) for member in updated.ensemble]).reshape(updated.ensemble.shape),
+        ensemble=np.array([free_matrices(nominal, *member) for member in updated.ensemble]).reshape(
+            updated.ensemble.shape
+        ),
     )
+
+
+def free_matrices(
+    nominal: ReducedModel, mass: FloatArray, damping: FloatArray, stiffness: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Let the rigid-body modes that met no force before an update meet none after it.
+
+    Parameters
+    ----------
+    nominal : ReducedModel
+        Before the update.
+    mass, damping, stiffness : (r, r) array
+        After it.
+
+    Returns
+    -------
+    tuple of (r, r) arrays
+        The same but for rounding.
+    """
+    if not nominal.rigid.size:
+        return mass, damping, stiffness
+    unstrained, undamped = (
+        nominal.rigid[:, meet_no_force(matrix, nominal.rigid)] for matrix in (nominal.stiffness, nominal.damping)
+    )
+    return mass, without_force(damping, mass, undamped), without_force(stiffness, mass, unstrained)

@@ -57,7 +57,7 @@ def differences(value, count):
 
 def test_stiffness_slopes_against_differences(problem):
     phase = stiffness_phase(problem)
-    start = phase.nominal_roots(problem.computed)
+    start = phase.named_roots(np.zeros(len(phase.basis.names)), problem.computed)
     theta = 0.01 * np.random.default_rng(0).standard_normal(len(phase.basis.names))
     tracked = phase.roots(theta, start)
     slopes = phase.slopes(theta, tracked)
@@ -75,7 +75,7 @@ def test_damping_slopes_against_differences(case, has_damper):
         problem = replace(problem, model=damped)
     frame = frame_of(problem.model)
     phase = minimal_change._stiffness_phase(problem, frame)
-    result = iterate(phase, phase.nominal_roots(problem.computed))
+    result = iterate(phase, phase.named_roots(np.zeros(len(phase.basis.names)), problem.computed))
     inner = modal_frame(*phase.matrices(result.theta))
     damping = minimal_change._damping_phase(problem, frame, inner, phase, result, np.zeros(len(problem.values)))
     count = damping.terms[0].root.shape[0]
@@ -87,7 +87,7 @@ def test_damping_slopes_against_differences(case, has_damper):
 
 def test_an_indefinite_stiffness_is_refused(problem):
     phase = stiffness_phase(problem)
-    start = phase.nominal_roots(problem.computed)
+    start = phase.named_roots(np.zeros(len(phase.basis.names)), problem.computed)
     theta = np.where(phase.basis.logarithmic, 0.0, -5.0)
     if not phase.basis.logarithmic.any():
         assert phase.roots(theta, start) is None
@@ -96,7 +96,7 @@ def test_an_indefinite_stiffness_is_refused(problem):
 def test_roots_are_tracked_through_a_crossing(problem):
     """Every target keeps its root through a large change: by the vectors, not by the order."""
     phase = stiffness_phase(problem)
-    tracked = phase.nominal_roots(problem.computed)
+    tracked = phase.named_roots(np.zeros(len(phase.basis.names)), problem.computed)
     direction = np.random.default_rng(2).standard_normal(len(phase.basis.names))
     direction /= np.abs(direction).max()
     small = 0.002

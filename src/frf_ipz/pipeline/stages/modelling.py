@@ -198,7 +198,7 @@ def update(
         {"options": asdict(options), "sensors": repr(sensors), "tolerance": tolerance, "after": runner.after("pair")},
         compute,
         lambda result: {
-            "pairs.parquet": partial(write_table, tables.pair_table(pairs, result.after)),
+            "pairs.parquet": partial(write_table, tables.pair_table(result.pairs or pairs, result.after)),
             "parameters.parquet": partial(write_table, tables.history_table(result)),
             "updated_model.npz": partial(write_reduced_model, result.model, dofs=(*measured, *runner.inputs.points)),
         },

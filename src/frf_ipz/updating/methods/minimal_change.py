@@ -9,7 +9,7 @@ positive semi-definite, rigid-body modes stay. The ensemble is drawn from the po
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,15 +24,17 @@ from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, frame_of, modal_frame, modal_parameters
 from frf_ipz.updating.minimal_change.outliers import contradicted_targets, unmet_targets
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase, log_moduli
+from frf_ipz.updating.pairing_again import ROUNDS
 from frf_ipz.updating.parameters import ParameterBasis, generic_basis
 from frf_ipz.updating.target_noise import project
-from frf_ipz.updating.tracking import TargetRoots, TrackedRoots
-from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, nothing_to_do
+from frf_ipz.updating.tracking import TargetRoots, TrackedRoots, track, with_damping
+from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, free_matrices, nothing_to_do
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from frf_ipz.progress import Progress
+    from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.options import UpdateOptions
     from frf_ipz.updating.problem import UpdateProblem
 else:
@@ -41,6 +43,7 @@ else:
 SMALLEST_NOISE = 1e-6  # relative standard deviation of a frequency: none is measured better
 EXCLUDED_STD = 1.0  # relative standard deviation of an excluded target
 OF_DAMPING = 1.0  # change of the logarithm of a modulus by damping, from which damping makes a root
+STEPS_BACK = 16  # to the nominal model: so many that roots keep the greater part of their vectors over each
 SHIFTED = 0.1  # standard deviations of a modulus from which the stiffness is updated again for the change by damping
 
 
@@ -64,16 +67,73 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     if not len(problem.values):
         return nothing_to_do(problem.model, "minimal-change")
     frame = frame_of(problem.model)
+    update_of = _solve(problem, frame, options, progress)
+    pairs, again = None, problem.pair_again
+    for _ in range(ROUNDS):
+        if again is None:
+            break
+        model = update_of.model()
+        paired = again.with_model(problem, model, pairs or again.pairs, update_of.values(model))
+        if paired is None:
+            break
+        further = _solve(paired[1], frame, options, progress, start=update_of)
+        if not again.deviation_db(further.model()) < again.deviation_db(model):
+            break
+        pairs, update_of = paired[0], further
+    progress(0.8, "ensemble")
+    updated = _updated(update_of, options)
+    if pairs is None or again is None:
+        return updated
+    before = _values_before(update_of)
+    return replace(updated, before=before, pairs=again.named_before(pairs, problem.model, before))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Update:
+    """An update of both phases: its targets, what is left open, what was done, and which targets were excluded."""
+
+    problem: UpdateProblem
+    posterior: Posterior
+    history: tuple[tuple[str, PhaseResult], ...]
+    excluded: IntArray
+
+    def model(self) -> ReducedModel:
+        nominal = self.problem.model
+        mass, damping, stiffness = free_matrices(nominal, *self.posterior.model())
+        return replace(nominal, mass=mass, damping=damping, stiffness=stiffness)
+
+    def values(self, model: ReducedModel) -> ComplexArray:
+        tracked = self.posterior.damping_result.tracked.values(len(self.problem.values))
+        return self.problem.nearest_roots(model, tracked)
+
+
+def _solve(
+    problem: UpdateProblem,
+    frame: ModalFrame,
+    options: UpdateOptions,
+    progress: Progress,
+    *,
+    start: _Update | None = None,
+) -> _Update:
+    """Bring stiffness and damping to the targets, from the nominal model or from an update that went before."""
     phase = _stiffness_phase(problem, frame)
-    start = phase.nominal_roots(problem.computed)
-    stated = _change_by_damping(problem.computed, start)
+    before = None if start is None else start.posterior.stiffness_result
+    theta = np.zeros(len(phase.basis.names)) if before is None else before.theta
+    roots = phase.named_roots(theta, problem.computed)
+    stated = _change_by_damping(problem.computed, roots)
     # a zero that is there by damping only tells nothing of stiffness
     of_damping = np.where(np.abs(stated) > OF_DAMPING, stated**2, 0.0)
     phase = replace(phase, targets=phase.targets - stated, noise=phase.noise.plus(of_damping))
-    excluded, likely = contradicted_targets(phase, start)
+    excluded, likely = contradicted_targets(phase, roots, theta)
     is_excluded = np.isin(np.arange(len(phase.target_roots.frf)), excluded)
     phase = replace(phase, noise=phase.noise.plus(np.where(is_excluded, EXCLUDED_STD**2, 0.0)))
-    result = iterate(phase, start, likely=likely, max_iterations=options.max_iterations)
+    result = iterate(
+        phase,
+        roots,
+        start=None if before is None else before.whitened,
+        likely=likely if before is None else before.scales[:-1],
+        max_iterations=options.max_iterations,
+    )
     progress(0.5, "damping")
     inner = modal_frame(*phase.matrices(result.theta))
     damping = _damping_phase(problem, frame, inner, phase, result, of_damping)
@@ -98,8 +158,19 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
         damping=damping,
         damping_result=damped,
     )
-    progress(0.8, "ensemble")
-    return _updated(problem, options, posterior, history, excluded)
+    earlier = () if start is None else start.history
+    return _Update(problem=problem, posterior=posterior, history=(*earlier, *history), excluded=excluded)
+
+
+def _values_before(update_of: _Update) -> ComplexArray:
+    """Give the targets in the nominal model, followed from the updated one on a straight line."""
+    phase, result = update_of.posterior.stiffness, update_of.posterior.stiffness_result
+    problem, tracked = update_of.problem, result.tracked
+    for share in np.linspace(1.0, 0.0, STEPS_BACK + 1)[1:]:
+        tracked = track(phase.target_roots, tracked, *phase.matrices(share * result.theta))
+    damping = update_of.posterior.frame.to_modal(problem.model.damping)
+    mass, stiffness = phase.matrices(0.0 * result.theta)
+    return with_damping(phase.target_roots, tracked, mass, damping, stiffness).values(len(problem.values))
 
 
 def _change_by_damping(damped: ComplexArray, undamped: TrackedRoots) -> FloatArray:
@@ -166,13 +237,8 @@ def _modal_rows(problem: UpdateProblem, frame: ModalFrame) -> dict[int, tuple[Fl
     return {number: (output @ frame.shapes, force @ frame.shapes) for number, (output, force) in pairs.items()}
 
 
-def _updated(
-    problem: UpdateProblem,
-    options: UpdateOptions,
-    posterior: Posterior,
-    history: list[tuple[str, PhaseResult]],
-    excluded: IntArray,
-) -> UpdatedModel:
+def _updated(update_of: _Update, options: UpdateOptions) -> UpdatedModel:
+    problem, posterior = update_of.problem, update_of.posterior
     mass, damping, stiffness = posterior.model()
     model = replace(problem.model, mass=mass, damping=damping, stiffness=stiffness)
     converged = posterior.stiffness_result.converged and posterior.damping_result.converged
@@ -183,11 +249,11 @@ def _updated(
         nominal=problem.model,
         method="minimal-change",
         status=UpdateStatus.CONVERGED if converged else UpdateStatus.MAX_ITERATIONS,
-        history=pd.DataFrame([{"phase": name, **row} for name, result in history for row in result.rows]),
+        history=pd.DataFrame([{"phase": name, **row} for name, result in update_of.history for row in result.rows]),
         before=problem.computed,
         after=problem.nearest_roots(model, tracked),
         ensemble=ensemble,
-        unmet=unmet_targets(posterior.stiffness_result, problem.names, excluded),
+        unmet=unmet_targets(posterior.stiffness_result, problem.names, update_of.excluded),
         parts=_parts(posterior.stiffness.basis, posterior.stiffness_result.theta, draws),
     )
 

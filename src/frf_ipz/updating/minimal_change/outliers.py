@@ -24,7 +24,7 @@ TOLERANCE = 1e-4  # relative error that counts as met in any case
 INSENSITIVE = 1e-3  # relative change by the prior's standard deviations below which no parameter moves a target
 
 
-def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots) -> tuple[IntArray, FloatArray]:
+def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots, theta: FloatArray) -> tuple[IntArray, FloatArray]:
     """Find targets that all others contradict: mostly pairs that join two different modes.
 
     Parameters
@@ -32,7 +32,9 @@ def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots) -> tuple[In
     phase : StiffnessPhase
         The stiffness phase.
     start : TrackedRoots
-        Roots of the nominal model.
+        Roots of the model from which the iteration starts.
+    theta : (p,) array
+        Its parameters.
 
     Returns
     -------
@@ -41,15 +43,15 @@ def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots) -> tuple[In
     scales : (t,) array
         Most likely standard deviations of the prior terms without them.
     """
-    theta = np.zeros(len(phase.basis.names))
     error = phase.errors(start)
     slopes = phase.slopes(theta, start)
     parts = [term.by_whitened(slopes) for term in phase.terms]
     noise = phase.noise.plus((CURVATURE * error**2) ** 2)
+    data = error + slopes @ theta
     scales = np.array([term.std for term in phase.terms])
     outliers: list[int] = []
     while len(outliers) <= MAX_SHARE * len(error):
-        linear = linearise(parts, error, noise, scales=scales)
+        linear = linearise(parts, data, noise, scales=scales)
         scales = most_likely_scales(linear, phase.terms, scales)
         worst = most_contradicted(linear, scales, CONTRADICTED, least=MIN_ERROR)
         if worst < 0:

@@ -81,20 +81,22 @@ class StiffnessPhase:
             mass = mass + np.tensordot(amounts, self.basis.mass, 1)
         return mass, np.diag(self.eigenvalues) + np.tensordot(amounts, self.basis.stiffness, 1)
 
-    def nominal_roots(self, computed: ComplexArray) -> TrackedRoots:
-        """Find the nominal roots that the pairing named.
+    def named_roots(self, theta: FloatArray, computed: ComplexArray) -> TrackedRoots:
+        """Find the roots that the pairing named.
 
         Parameters
         ----------
+        theta : (p,) array
+            Parameters of the model that was paired.
         computed : (n,) complex array
-            The nominal model's poles and zeros, rad/s.
+            Its poles and zeros, rad/s.
 
         Returns
         -------
         TrackedRoots
             Roots at the start of the iteration.
         """
-        return nominal_roots(self.target_roots, *self.matrices(np.zeros(len(self.basis.names))), computed)
+        return nominal_roots(self.target_roots, *self.matrices(theta), computed)
 
     def roots(self, theta: FloatArray, reference: TrackedRoots) -> TrackedRoots | None:
         """Give the squared roots that belong to the targets; see `Phase`.
