@@ -94,6 +94,8 @@ class Geometry(Concise):
         How a node is supported: ``clamped``, ``pinned``, ``sliding`` or ``ground``.
     is_schematic : bool
         Coordinates are no positions: the masses of a lumped model drawn in a row.
+    ports : mapping of str to tuple of int
+        The nodes that each port joins.
 
     Examples
     --------
@@ -111,6 +113,7 @@ class Geometry(Concise):
     lines: IntArray
     supports: Mapping[int, str] = field(default_factory=dict)
     is_schematic: bool = False
+    ports: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -547,6 +550,12 @@ class StructuralModel(Drawn):
         bound = bind_port(label, self.port_dofs)
         port = next(port for port in self.ports if port.dof == bound.unsigned)
         return {dof: label.sign * weight for dof, weight in port.weights.items()}
+
+    @property
+    def drawn_geometry(self) -> Geometry:
+        """Where nodes are and what joins them, with the nodes of the ports."""
+        ports = {port.name: tuple(sorted({dof.node for dof in port.weights} - {GROUND})) for port in self.ports}
+        return replace(self.geometry, ports=ports)
 
     def _check_ports(self) -> None:
         for number, port in enumerate(self.ports):

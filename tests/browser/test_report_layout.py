@@ -175,3 +175,25 @@ def test_a_browser_that_cannot_unpack_the_library_says_so_and_shows_the_tables(b
         assert browser.find_element("css selector", "#state-space table").is_displayed()
     finally:
         browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", {"identifier": old["identifier"]})
+
+
+def test_the_structure_moves_turns_and_rests(page):
+    image = "return document.querySelector('#shape canvas').toDataURL()"
+    page.execute_script("document.querySelector('#shape').scrollIntoView()")
+    wait_for(page, "return document.querySelector('#play').textContent === 'Pause'")
+    page.execute_script("document.querySelector('#play').click()")
+    assert page.execute_script("return document.querySelector('#shape figcaption').textContent").startswith("Mode 1")
+    at_rest = page.execute_script(image)
+    turn = "document.querySelector('#shape canvas').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight'}))"
+    page.execute_script(turn)
+    turned = page.execute_script(image)
+    assert turned != at_rest
+    page.execute_script("document.querySelector('#shape [data-view=front]').click()")
+    assert page.execute_script(image) == at_rest  # a beam is seen from the front at first
+    page.execute_script(
+        "const modes = document.querySelector('#shape [name=mode]'); modes.value = '1';"
+        "modes.dispatchEvent(new Event('change', {bubbles: true}))"
+    )
+    assert page.execute_script("return document.querySelector('#shape figcaption').textContent").startswith("Mode 2")
+    assert page.execute_script(image) != at_rest
+    assert not errors(page)

@@ -203,8 +203,8 @@ def test_a_rejection_without_a_reason_is_refused(page, demo):
 
 def test_the_structure_moves_and_rests(page):
     page.show("#shape")
-    pose = "return document.querySelector('#shape-drawing path.updated').getAttribute('d')"
-    page.wait_until(lambda: page.run(pose))
+    pose = "return document.querySelector('#shape canvas').toDataURL()"
+    page.wait_until(lambda: "Mode 1" in page.find("#shape figcaption").text)
     first = page.run(pose)
     page.wait_until(lambda: page.run(pose) != first)
     page.click("#play")
@@ -220,7 +220,7 @@ def test_the_structure_moves_and_rests(page):
         "const modes = document.querySelector('#shape-form').elements.mode; modes.value = '';"
         "modes.dispatchEvent(new Event('change', {bubbles: true}))"
     )
-    page.wait_until(lambda: "for 1 N at" in page.find("#shape-title").text)
+    page.wait_until(lambda: "for 1 N at" in page.find("#shape figcaption").text)
     assert page.find("#operating").is_displayed()
 
 

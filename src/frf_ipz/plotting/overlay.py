@@ -48,6 +48,6 @@ def describe_overlay(compared: ModelsBesideMeasurement, frf: int) -> Picture:
             Panel(y=PHASE_AXIS, layers=phases),
         ),
         x=frequency_axis(float(x[0]), float(x[-1])),
-        note=AS_MEASURED + (GAINS if compared.has_fitted_gains else ""),
+        note=((AS_MEASURED if compared.has_window else "") + (GAINS if compared.has_fitted_gains else "")).strip(),
         height_px=460,
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.dofs import node_dofs
+from frf_ipz.dofs import PortDof, node_dofs
 from frf_ipz.plotting.picture import Axis, Colour, Labels, Layer, Line, Panel, Picture, Points, Role, joined_segments
 from frf_ipz.plotting.projection import project
 from frf_ipz.plotting.wording import listed, number
@@ -100,12 +100,13 @@ def describe_structure(geometry: Geometry | None, marks: StructureMarks) -> Pict
     rows = {int(node): row for row, node in enumerate(nodes)}
     is_line = not np.ptp(positions[:, 1])
     layers: list[Layer] = [
-        _body(positions, lines, rows),
+        _body(positions, lines, rows, is_line=is_line),
         _nodes(nodes, positions),
         *_supports(geometry, positions, rows),
     ]
     for name, dofs in marks.dofs.items():
         layers += _dofs(name, dofs, positions, rows, is_line=is_line)
+        layers += [] if geometry is None else _ports(name, dofs, geometry, positions, rows)
     layers += _rings("missing in the model", "circle", marks.missing, positions, rows)
     layers += _rings("location of the mismatch", "diamond", marks.mismatch, positions, rows)
     x, y = _axes(marks.across if geometry is not None else "Node number", positions, is_line=is_line)
@@ -184,11 +185,11 @@ def _plan(geometry: Geometry | None, marks: StructureMarks) -> tuple[IntArray, F
     return geometry.nodes, project(geometry.coordinates_m), geometry.lines
 
 
-def _body(positions: FloatArray, lines: IntArray, rows: Mapping[int, int]) -> Line:
+def _body(positions: FloatArray, lines: IntArray, rows: Mapping[int, int], *, is_line: bool) -> Line:
     ends = np.array([(rows[int(a)], rows[int(b)]) for a, b in lines if int(a) in rows and int(b) in rows], int)
     starts, stops = positions[ends.reshape(-1, 2)].transpose(1, 0, 2)
     x, y = joined_segments(starts, stops)
-    return Line(name="structure", colour=Role.MUTED, in_legend=False, x=x, y=y, width=4)
+    return Line(name="structure", colour=Role.MUTED, in_legend=False, x=x, y=y, width=4 if is_line else 2)
 
 
 def _nodes(nodes: IntArray, positions: FloatArray) -> Points:
@@ -262,6 +263,42 @@ def _dofs(
         side=mark.side,
     )
     return [points, words]
+
+
+def _ports(
+    name: str, dofs: Sequence[AnyDof], geometry: Geometry, positions: FloatArray, rows: Mapping[int, int]
+) -> list[Layer]:
+    """Draw ports amid the nodes that they join, with a line to each."""
+    known = [
+        (dof, [rows[node] for node in geometry.ports.get(dof.name, ()) if node in rows])
+        for dof in dofs
+        if isinstance(dof, PortDof)
+    ]
+    known = [(dof, joined) for dof, joined in known if joined]
+    if not known:
+        return []
+    middles = np.array([positions[joined].mean(axis=0) for _, joined in known])
+    starts = np.concatenate(
+        [np.broadcast_to(middle, (len(joined), 2)) for middle, (_, joined) in zip(middles, known, strict=True)]
+    )
+    ends = np.concatenate([positions[joined] for _, joined in known])
+    mark = MARKS[name]
+    x, y = joined_segments(starts, ends)
+    links = Line(name=f"{name}: port", colour=mark.colour, group=f"{name}: port", in_legend=False, x=x, y=y, dash="dot")
+    points = Points(
+        name=f"{name}: port",
+        colour=mark.colour,
+        group=f"{name}: port",
+        x=middles[:, 0],
+        y=middles[:, 1],
+        symbol=mark.symbol,
+        size=13,
+        is_filled=False,
+        hover="{text}",
+        texts=[str(dof) for dof, _ in known],
+        labels=mark.side_in_plane if len(known) <= MOST_LABELS else "",
+    )
+    return [links, points]
 
 
 def _side_by_side(labels: Sequence[tuple[float, str]], extent: float) -> list[tuple[float, str]]:

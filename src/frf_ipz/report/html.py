@@ -16,6 +16,7 @@ from jinja2 import Environment, PackageLoader, PrefixLoader, StrictUndefined
 REPORT = "frf_ipz.report"
 PLOTLY = "plotly-cartesian.min.js"
 SCRIPTS = (PLOTLY, "page.js")  # of a page with pictures, in the order in which they run
+RUN_SCRIPTS = (*SCRIPTS, "shapes.js")  # of the page of a run
 
 
 @cache

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from frf_ipz.output_files import write_text
 from frf_ipz.progress import Progress, silent
-from frf_ipz.report.html import PLOTLY, REPORT, SCRIPTS, packed_asset, page_environment, read_asset
+from frf_ipz.report.html import PLOTLY, REPORT, RUN_SCRIPTS, packed_asset, page_environment, read_asset
 from frf_ipz.report.page_data import page_data
 from frf_ipz.report.plotly_drawing import colour_name
 from frf_ipz.report.policy import page_policy
@@ -27,6 +27,7 @@ from frf_ipz.report.sections import (
     prediction,
     provenance,
     recordings,
+    shapes,
     stabilization,
     state_space,
     updating,
@@ -46,6 +47,7 @@ Build: TypeAlias = "Callable[[Results], Section | None]"
 SECTIONS: tuple[Build, ...] = (
     overview.build,
     comparison.build,
+    shapes.build,
     recordings.build,
     frfs.build,
     stabilization.build,
@@ -118,8 +120,8 @@ def render_page(run: Results, sections: Sequence[Section]) -> str:
         style=read_asset(REPORT, "page.css"),
         margins=page_margins(run),
         library=packed_asset(REPORT, PLOTLY),
-        script=read_asset(REPORT, "page.js"),
-        policy=page_policy(*[read_asset(REPORT, name) for name in SCRIPTS]),
+        scripts=[read_asset(REPORT, name) for name in RUN_SCRIPTS[1:]],
+        policy=page_policy(*[read_asset(REPORT, name) for name in RUN_SCRIPTS]),
     )
 
 

@@ -41,6 +41,8 @@ class ModelsBesideMeasurement:
         As measured, and of the models before and after updating.
     has_fitted_gains : bool
         The scale of the measurement is unknown, so that each model's FRF has a gain that was fitted.
+    has_window : bool
+        Force and response share an exponential window, which widens the peaks.
     """
 
     frequency_hz: FloatArray
@@ -49,6 +51,7 @@ class ModelsBesideMeasurement:
     nominal: ComplexArray
     updated: ComplexArray
     has_fitted_gains: bool
+    has_window: bool = False
 
     @property
     def names(self) -> list[str]:
@@ -167,6 +170,7 @@ def models_beside_measurement(run: Results) -> ModelsBesideMeasurement | None:
         nominal=run.updated_model.compute_frfs(labels, s, nominal=True),
         updated=run.updated_model.compute_frfs(labels, s),
         has_fitted_gains=run.updated_model.scale.is_relative and run.updated_model.scale.is_fitted,
+        has_window=bool(run.frfs.window_decay_1_s),
     )
 
 

@@ -18,12 +18,12 @@ from starlette.routing import Mount, Route
 from frf_ipz.errors import FrfIpzError, InputError
 from frf_ipz.report.html import PLOTLY, REPORT, read_asset
 from frf_ipz.runs.results import errors_of_results
+from frf_ipz.runs.shapes import draw_shape, draw_structure, mode_shape, operating_shape
 from frf_ipz.show.downloads import picture_file
 from frf_ipz.show.guard import Guard
 from frf_ipz.show.list_page import render_list
 from frf_ipz.show.page import SHOW, Addresses, render_choices, render_page
 from frf_ipz.show.result_files import send_file
-from frf_ipz.show.shapes import draw_shape, mode_shape, operating_shape
 from frf_ipz.show.zoom import zoomed_traces
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ TOKEN_BYTES = 24
 ASSETS = {
     "plotly.js": (REPORT, PLOTLY, "text/javascript"),
     "page.js": (REPORT, "page.js", "text/javascript"),
+    "shapes.js": (REPORT, "shapes.js", "text/javascript"),
     "show.js": (SHOW, "show.js", "text/javascript"),
     "band_edges.js": (SHOW, "band_edges.js", "text/javascript"),
     "page.css": (REPORT, "page.css", "text/css"),
@@ -193,7 +194,10 @@ def _shape(bench: Workbench, request: Request) -> Response:
             shape = operating_shape(run, float(query.get("hz", "nan")), query.get("input", ""))
     except ValueError as error:
         raise InputError(str(error)) from None
-    return JSONResponse(draw_shape(shape, run.geometry))
+    structure = draw_structure(
+        run, [dof for motion in shape.motions if motion.name == "measured" for dof in motion.dofs]
+    )
+    return JSONResponse({"structure": structure.to_json(), **draw_shape(shape, structure)})
 
 
 def _zoom(bench: Workbench, request: Request) -> Response:

@@ -11,6 +11,7 @@ from frf_ipz.ingest.survey.selection import is_named
 from frf_ipz.plotting.wording import number, percent
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 from frf_ipz.report.section import Form
+from frf_ipz.report.sections.shapes import TEMPLATE, mode_names
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -206,13 +207,12 @@ def shape_form(run: Results) -> Form:
     Form
         With the modes of the fit and the inputs of the test.
     """
-    fit, frfs = run.fit, run.frfs
-    hertz = np.zeros(0) if fit is None else natural_frequency_hz(fit.model.poles[: fit.n_modes])
+    frfs = run.frfs
     lines = np.zeros(1) if frfs is None else frfs.frequency_hz
     return Form(
-        template="show/shape.html",
+        template=TEMPLATE,
         data={
-            "modes": [f"{mode}: {number(value, 5)} Hz" for mode, value in enumerate(hertz, start=1)],
+            "modes": mode_names(run),
             "inputs": [] if frfs is None else [str(dof) for dof in frfs.input_dofs],
             "lowest_hz": f"{lines[0]:g}",
             "highest_hz": f"{lines[-1]:g}",

@@ -9,6 +9,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.report.html import page_environment
 from frf_ipz.report.page import SECTIONS, run_values
 from frf_ipz.report.section import Block, Figure, Section
+from frf_ipz.report.sections import shapes
 from frf_ipz.show.controls import (
     Choices,
     command_line,
@@ -143,11 +144,9 @@ def page_sections(run: Results, choices: PipelineFile | None) -> list[Section]:
     """
     sections: list[Section] = []
     for build in SECTIONS:
-        section = build(run)
+        section = _shapes(run) if build is shapes.build else build(run)
         if section is not None:
             sections.append(section if choices is None else _with_controls(section, run, choices))
-            if section.anchor == "overview" and (run.fit is not None or run.labels):
-                sections.append(_shapes(run))
     return sections
 
 
@@ -200,9 +199,11 @@ def _redrawn(blocks: Sequence[Block], name: str, change: Callable[[Picture], Pic
     ]
 
 
-def _shapes(run: Results) -> Section:
-    lead = "How the structure moves: what was measured beside the model before and after updating."
-    return Section(anchor="shapes", title="Shapes", lead=lead, blocks=(shape_form(run),))
+def _shapes(run: Results) -> Section | None:
+    """Give the section of the shapes, of which the page asks for one at a time."""
+    if run.fit is None and not run.labels:
+        return None
+    return Section(anchor="shapes", title="Shapes", lead=shapes.LEAD, blocks=(shape_form(run),))
 
 
 def _read_choices(bench: Workbench) -> tuple[PipelineFile | None, str]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
-from frf_ipz.report.html import REPORT, SCRIPTS, read_asset
+from frf_ipz.report.html import REPORT, RUN_SCRIPTS, read_asset
 from frf_ipz.report.policy import page_policy
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def send_file(folder: Path, name: str) -> Response:
         return PlainTextResponse("There is no such file in this run.\n", 404)
     path, status = found
     kind = SHOWN.get(path.suffix.lower())
-    policy = page_policy(*(read_asset(REPORT, script) for script in SCRIPTS))
+    policy = page_policy(*(read_asset(REPORT, script) for script in RUN_SCRIPTS))
     return FileResponse(
         path,
         media_type=kind or "application/octet-stream",

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from frf_ipz.dofs import parse_dof
-from frf_ipz.plotting.picture import Labels
+from frf_ipz.dofs import PortDof, parse_dof
+from frf_ipz.plotting.picture import Labels, Points
 from frf_ipz.plotting.structure import StructureMarks, describe_structure
 from frf_ipz.structure import Geometry
 
@@ -91,3 +91,17 @@ def test_labels_that_would_cover_each_other_are_written_side_by_side(nodes, labe
     assert list(words.texts) == labels
     joined = [node for node in nodes if str(node) in labels[-1]]
     np.testing.assert_allclose(words.x[-1], (along[nodes[-1] - 1, 0] + along[joined[0] - 1, 0]) / 2, rtol=1e-12, atol=0)
+
+
+def test_a_port_stands_amid_the_nodes_that_it_joins():
+    plate = Geometry(
+        nodes=np.array([1, 2, 3, 4]),
+        coordinates_m=np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]),
+        lines=np.array([[1, 2], [2, 3], [3, 4], [4, 1]]),
+        ports={"tilt": (1, 3)},
+    )
+    picture = describe_structure(plate, StructureMarks(points=(PortDof("tilt"),)))
+    (port,) = [one for one in picture.layers if one.name == "point of interest: port" and isinstance(one, Points)]
+    body = layer(describe_structure(plate, StructureMarks()), "nodes")
+    np.testing.assert_allclose([port.x[0], port.y[0]], [np.mean(body.x[[0, 2]]), np.mean(body.y[[0, 2]])])
+    assert port.texts == ["tilt"]

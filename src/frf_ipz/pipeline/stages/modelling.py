@@ -47,7 +47,7 @@ def outline(runner: StageRunner, model: StructuralModel, *, corrected_by: Diagno
         What the model was corrected by, if it was.
     """
     key = {"model": runner.inputs.model_key, "corrected": corrections(corrected_by)}
-    runner.stage("model", key, lambda _: model.geometry)
+    runner.stage("model", key, lambda _: model.drawn_geometry)
 
 
 def reduce(

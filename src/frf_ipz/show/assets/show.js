@@ -7,8 +7,6 @@
   };
   const MEMORY = "frf-ipz-show";
   const SOON_MS = 400, LATER_MS = 3000;
-  const CYCLE_MS = 1600;
-  const SVG = "http://www.w3.org/2000/svg";
   const find = (selector) => document.querySelector(selector);
   const all = (selector) => [...document.querySelectorAll(selector)];
   const stamp = document.body.dataset.stamp;
@@ -215,87 +213,18 @@
 
   // --- The structure in motion -------------------------------------------------------------------------------------
 
-  const moving = { shape: null, phase: 0, isPlaying: false, isSeen: false, last: 0, parts: [] };
-
   async function loadShape() {
-    const form = find("#shape-form");
-    const values = form.elements;
+    const values = find("#shape-form").elements;
     const isOperating = values.mode.value === "";
     find("#operating").hidden = !isOperating;
     const asked = isOperating ? { hz: values.hz.value, input: values.input.value } : { mode: values.mode.value };
     try {
-      moving.shape = await ask(`shape?${new URLSearchParams(asked)}`);
+      const { structure, ...shape } = await ask(`shape?${new URLSearchParams(asked)}`);
+      frfIpzShape.show(structure, shape);
       complain("");
     } catch (error) {
       complain(error.message);
-      return;
     }
-    drawShape();
-    pose();
-  }
-
-  function element(name, properties, parent) {
-    const made = document.createElementNS(SVG, name);
-    Object.entries(properties).forEach(([key, value]) => made.setAttribute(key, value));
-    parent.append(made);
-    return made;
-  }
-
-  function drawShape() {
-    const { title, frame, ground, lines, motions } = moving.shape;
-    const [left, low, width, height] = frame;
-    find("#shape-title").textContent = title;
-    const label = `${title}: ${motions.map((motion) => motion.title).join("; ")}`;
-    const place = find("#shape-drawing");
-    place.textContent = "";
-    const box = { viewBox: `${left} ${-low - height} ${width} ${height}`, role: "img", "aria-label": label };
-    const drawing = element("svg", box, place);
-    const radius = 0.006 * Math.max(width, 2 * height);
-    const lineOf = (points) => lines.map(([a, b]) => `M${points[a][0]} ${-points[a][1]}L${points[b][0]} ${-points[b][1]}`).join("");
-    element("path", { class: "ground", d: lineOf(ground) }, drawing);
-    moving.parts = motions.map((motion) => {
-      const line = element("path", { class: `motion ${motion.name}` }, drawing);
-      const dots = motion.hasLines ? [] : motion.at.map((at, place) => {
-        const dot = element("circle", { class: `motion ${motion.name}`, r: radius }, drawing);
-        element("title", {}, dot).textContent = `node ${motion.nodes[place]}, ${motion.title}`;
-        return dot;
-      });
-      return { motion, line, dots, lineOf };
-    });
-    const legend = motions.map((motion) => `<li><span class="key ${motion.name}"></span></li>`).join("");
-    find("#shape-legend").innerHTML = legend;
-    all("#shape-legend li").forEach((item, place) => item.append(motions[place].title));
-  }
-
-  function pose() {
-    const [c, s] = [Math.cos(moving.phase), -Math.sin(moving.phase)];
-    for (const { motion, line, dots, lineOf } of moving.parts) {
-      const points = motion.at.map(([x, y], k) => {
-        const [a, b, p, q] = motion.move[k];
-        return [x + a * c + p * s, y + b * c + q * s];
-      });
-      const stems = () => points.map(([x, y], k) => `M${motion.at[k][0]} ${-motion.at[k][1]}L${x} ${-y}`).join("");
-      line.setAttribute("d", motion.hasLines ? lineOf(points) : stems());
-      dots.forEach((dot, k) => { dot.setAttribute("cx", points[k][0]); dot.setAttribute("cy", -points[k][1]); });
-    }
-    find("#phase").value = Math.round((moving.phase * 180) / Math.PI) % 360;
-  }
-
-  function tick(now) {
-    if (!moving.isPlaying || !moving.isSeen) return;
-    if (moving.last) moving.phase = (moving.phase + (2 * Math.PI * (now - moving.last)) / CYCLE_MS) % (2 * Math.PI);
-    moving.last = now;
-    pose();
-    requestAnimationFrame(tick);
-  }
-
-  function play(isOn, isSeen = moving.isSeen) {
-    const stood = !moving.isPlaying || !moving.isSeen;
-    Object.assign(moving, { isPlaying: isOn, isSeen });
-    const button = find("#play");
-    button.textContent = isOn ? "Pause" : "Play";
-    button.setAttribute("aria-pressed", isOn);
-    if (stood && isOn && isSeen) { moving.last = 0; requestAnimationFrame(tick); }
   }
 
   function startShapes() {
@@ -305,19 +234,8 @@
       const field = form.elements[name];
       if (field.tagName !== "SELECT" || [...field.options].some((one) => one.value === value)) field.value = value;
     });
-    form.addEventListener("change", (event) => { if (event.target.id !== "phase") loadShape(); });
-    find("#phase").addEventListener("input", (event) => {
-      play(false);
-      moving.phase = (event.target.value * Math.PI) / 180;
-      pose();
-    });
-    find("#play").addEventListener("click", () => play(!moving.isPlaying));
-    const wantsRest = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
-    moving.isPlaying = !wantsRest;
-    new IntersectionObserver(([entry]) => {
-      moving.isSeen = false;
-      play(moving.isPlaying, entry.isIntersecting);
-    }).observe(find("#shape"));
+    form.addEventListener("change", (event) => { if (event.target.name) loadShape(); });
+    form.addEventListener("submit", (event) => event.preventDefault());
     loadShape();
   }
 

@@ -7,13 +7,23 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chains import chain, label
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import Dof, PortDof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.response import compute_frfs
 from frf_ipz.numerics.pencils import damped_poles
 from frf_ipz.pairing.pairs import PairVerdict
 from frf_ipz.quantities import FrfQuantity
-from frf_ipz.show.shapes import REACH, Motion, Shape, draw_shape, mode_shape, operating_shape
+from frf_ipz.runs.shapes import (
+    MOST_NODES,
+    REACH,
+    STEPS,
+    Motion,
+    Shape,
+    Structure,
+    draw_shape,
+    mode_shape,
+    operating_shape,
+)
 from frf_ipz.structure import Geometry
 
 ROUNDING = 1e-9  # of the largest value: a 5 by 5 solve, and eigenvectors of a lightly damped pencil
@@ -118,36 +128,71 @@ def shape_of(values, nodes, direction, name="measured"):
     return Motion(name=name, title=name, dofs=dofs, values=np.asarray(values, complex))
 
 
+def drawn_on(geometry, motions, kinds=None):
+    structure = Structure.of(geometry, [dof for motion in motions for dof in motion.dofs], kinds)
+    return structure.to_json(), draw_shape(Shape(title="t", motions=motions), structure)["motions"]
+
+
 def test_a_row_of_nodes_moves_upwards_by_a_fixed_part_of_its_length():
     geometry = Geometry(
         nodes=np.array([1, 2, 3]),
         coordinates_m=np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]),
         lines=np.array([[1, 2], [2, 3]]),
     )
-    motions = (shape_of([1, 2j], [2, 3], "z", "updated"), shape_of([-2], [3], "z"))
-    drawn = draw_shape(Shape(title="t", motions=motions), geometry)
-    updated, measured = drawn["motions"]
-    assert measured["at"] == [[2.0, 0.0]]
-    assert_allclose(measured["move"], [[0, -REACH * 2, 0, 0]], atol=1e-4)
-    assert updated["hasLines"]  # node 1 is held: no DOF of it moves
-    assert_allclose(updated["move"], [[0, 0, 0, 0], [0, REACH, 0, 0], [0, 0, 0, REACH * 2]], atol=1e-4)
-    assert drawn["lines"] == [[0, 1], [1, 2]]
+    structure, (updated, measured) = drawn_on(
+        geometry, (shape_of([1, 2j], [2, 3], "y", "updated"), shape_of([-2], [3], "y"))
+    )
+    assert structure["at"] == [[-STEPS / 2, 0, 0], [0, 0, 0], [STEPS / 2, 0, 0]]
+    assert structure["lines"] == [[0, 1], [1, 2]]
+    assert structure["isRow"]
+    full = round(REACH * STEPS)
+    assert (measured["rows"], measured["real"]) == ([2], [[0, 0, -full]])
+    assert updated["isWhole"]  # node 1 is held: no DOF of it moves
+    assert updated["real"] == [[0, 0, 0], [0, 0, full // 2], [0, 0, 0]]
+    assert updated["imag"] == [[0, 0, 0], [0, 0, 0], [0, 0, full]]
 
 
 def test_a_model_that_is_far_off_leaves_the_measurement_visible():
     motions = (shape_of([1e3], [2], "z", "updated"), shape_of([1.0], [2], "z"))
-    _, measured = draw_shape(Shape(title="t", motions=motions), None)["motions"]
-    assert measured["move"][0][1] == pytest.approx(REACH / 3, rel=1e-3)  # a single node: as if it were 1 m long
     geometry = Geometry(
         nodes=np.array([1, 2]), coordinates_m=np.array([[0.0, 0, 0], [3, 0, 0]]), lines=np.array([[1, 2]])
     )
-    _, measured = draw_shape(Shape(title="t", motions=motions), geometry)["motions"]
-    assert measured["move"][0][1] == pytest.approx(REACH, rel=1e-3)
+    for known in (None, geometry):
+        _, (_, measured) = drawn_on(known, motions)
+        assert measured["real"][0][2] == round(REACH * STEPS / 3)
 
 
-def test_a_plate_is_seen_from_above_at_an_angle():
-    nodes, places = np.array([1, 2, 3]), np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    geometry = Geometry(nodes=nodes, coordinates_m=places, lines=np.array([[1, 2], [1, 3]]))
-    drawn = draw_shape(Shape(title="t", motions=(shape_of([0, 0, 1], [1, 2, 3], "z"),)), geometry)
-    assert_allclose(drawn["ground"], [[0, 0], [0.866, 0.5], [-0.866, 0.5]], atol=1e-3)
-    assert_allclose(drawn["motions"][0]["move"][2], [0, REACH, 0, 0], atol=1e-4)
+PLATE = Geometry(
+    nodes=np.array([1, 2, 3, 4]),
+    coordinates_m=np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]),
+    lines=np.array([[1, 2], [2, 3], [3, 4], [4, 1]]),
+    ports={"tilt": (1, 3)},
+)
+
+
+def test_a_plate_is_a_surface_and_moves_in_space():
+    structure, (measured,) = drawn_on(PLATE, (shape_of([0, 0, 1], [1, 2, 3], "z"),))
+    assert structure["faces"] == [(0, 1, 2, 3)]
+    assert not structure["isRow"]
+    assert measured["real"][2] == [0, 0, round(REACH * STEPS)]
+
+
+def test_a_port_is_marked_at_the_nodes_that_it_joins():
+    kinds = {"sensor": [Dof(2, "z", -1)], "point": [PortDof("tilt"), PortDof("unknown")]}
+    structure, _ = drawn_on(PLATE, (shape_of([1.0], [3], "z"),), kinds)
+    assert structure["marks"] == [
+        {"kind": "sensor", "text": "2:-z", "rows": [1]},
+        {"kind": "point", "text": "tilt", "rows": [0, 2]},
+    ]
+
+
+def test_of_many_nodes_those_that_were_measured_are_drawn():
+    count = 3 * MOST_NODES
+    geometry = Geometry(
+        nodes=np.arange(1, count + 1),
+        coordinates_m=np.random.default_rng(1).normal(size=(count, 3)),
+        lines=np.zeros((0, 2), np.int64),
+    )
+    structure, (measured,) = drawn_on(geometry, (shape_of([1.0, 2.0], [2, 8999], "z"),))
+    assert len(structure["nodes"]) <= MOST_NODES + 3
+    assert [structure["nodes"][row] for row in measured["rows"]] == [2, 8999]

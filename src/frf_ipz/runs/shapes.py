@@ -1,6 +1,7 @@
-"""How the structure moves, measured beside model: mode shapes and operating shapes, and their drawing in the plane.
+"""How the structure moves, measured beside model: mode shapes and operating shapes, and their drawing in space.
 
-`draw_shape` gives where points stand and how far each moves; the page's script animates them.
+`draw_structure` gives where points stand and what joins them, `draw_shape` how far each moves; the script of a page
+turns and animates them.
 """
 
 from __future__ import annotations
@@ -11,14 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.dofs import Dof, node_dofs
+from frf_ipz.dofs import Dof, PortDof, node_dofs
 from frf_ipz.errors import InputError
 from frf_ipz.modes import modal_assurance
+from frf_ipz.numerics.closed_faces import faces_between_lines
 from frf_ipz.numerics.pencils import damped_poles
 from frf_ipz.rational import natural_frequency_hz
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
@@ -26,12 +28,10 @@ if TYPE_CHECKING:
     from frf_ipz.runs.results import Results
     from frf_ipz.structure import Geometry, ReducedModel
 
-FLAT = 1e-6  # of the largest extent: thinner than this is flat
+STEPS = 10_000  # whole numbers over the largest extent: finer than any screen
 MOST_NODES = 3000  # that are drawn; of more, some
 REACH = 0.16  # of the largest extent: how far the drawing moves at most
 MOST_BEYOND = 3.0  # a model that moves more than this many times what was measured leaves the drawing
-TALL = 1.25  # of the drawing against what moves in it
-BESIDE = 0.15  # of the margin above: a row of nodes moves upwards only
 AXES = {"x": 0, "y": 1, "z": 2}
 
 
@@ -71,6 +71,11 @@ class Shape:
 
     title: str
     motions: tuple[Motion, ...]
+
+    @property
+    def measured_dofs(self) -> tuple[AnyDof, ...]:
+        """DOFs at which the motion was measured."""
+        return self.motions[-1].dofs
 
 
 def mode_shape(run: Results, number: int) -> Shape:
@@ -227,108 +232,201 @@ def _scaled_onto(motion: Motion, measured: Motion, hertz: float) -> Motion:
     return Motion(name=motion.name, title=title, dofs=motion.dofs, values=motion.values * factor)
 
 
-def draw_shape(shape: Shape, geometry: Geometry | None) -> dict[str, Any]:
-    """Put a shape on the plane.
+def draw_structure(run: Results, dofs: Iterable[AnyDof] = ()) -> Structure:
+    """Choose what is drawn of the structure of a run.
+
+    Parameters
+    ----------
+    run : Results
+        What the run holds.
+    dofs : iterable of Dof
+        Further DOFs that are drawn in any case.
+
+    Returns
+    -------
+    Structure
+        With the sensors, excited DOFs and points of interest marked.
+    """
+    frfs = run.frfs
+    kinds: dict[str, Sequence[AnyDof]] = {
+        "sensor": () if frfs is None else frfs.output_dofs,
+        "input": () if frfs is None else frfs.input_dofs,
+        "point": run.points,
+    }
+    shown = [*dofs, *(dof for marked in kinds.values() for dof in marked)]
+    return Structure.of(run.geometry, shown, kinds)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Structure:
+    """What is drawn of a structure, whatever it does.
+
+    Parameters
+    ----------
+    nodes : (n_nodes,) int array
+        Those that are drawn.
+    positions_m : (n_nodes, 3) array
+        Where they are; in a row by their numbers where nobody knows.
+    lines : list of pairs of int
+        Rows of `nodes`.
+    faces : list of tuple of int
+        The same.
+    marks : list of dict
+        ``kind``, ``text`` and ``rows``: one row a DOF, several a port.
+    """
+
+    nodes: IntArray
+    positions_m: FloatArray
+    lines: list[list[int]]
+    faces: list[tuple[int, ...]]
+    marks: list[dict[str, Any]]
+
+    @classmethod
+    def of(
+        cls, geometry: Geometry | None, dofs: Iterable[AnyDof], kinds: Mapping[str, Sequence[AnyDof]] | None = None
+    ) -> Structure:
+        """Choose nodes, lines and faces.
+
+        Parameters
+        ----------
+        geometry : Geometry, optional
+            Of the FE model; without it, nodes stand in a row.
+        dofs : iterable of Dof
+            Whose nodes are drawn in any case.
+        kinds : mapping of str to sequence of Dof, optional
+            What is marked.
+
+        Returns
+        -------
+        Structure
+            What is drawn.
+        """
+        named = {dof.node for dof in node_dofs(dofs) if dof.node > 0}
+        if geometry is None:
+            nodes = np.array(sorted(named), np.int64)
+            positions = np.zeros((len(nodes), 3))
+            positions[:, 0] = nodes
+            pairs = np.stack([nodes[:-1], nodes[1:]], 1)
+        else:
+            is_drawn = np.ones(len(geometry.nodes), bool)
+            if len(geometry.nodes) > MOST_NODES:
+                is_drawn = np.isin(geometry.nodes, list(named))
+                is_drawn[:: -(-len(geometry.nodes) // MOST_NODES)] = True
+            nodes, positions, pairs = geometry.nodes[is_drawn], geometry.coordinates_m[is_drawn], geometry.lines
+        rows = {int(node): row for row, node in enumerate(nodes)}
+        lines = [[rows[int(a)], rows[int(b)]] for a, b in pairs if int(a) in rows and int(b) in rows]
+        ports = {} if geometry is None else geometry.ports
+        marks = [
+            {"kind": kind, "text": str(dof), "rows": [rows[node] for node in _nodes_of(dof, ports) if node in rows]}
+            for kind, marked in (kinds or {}).items()
+            for dof in marked
+        ]
+        return cls(
+            nodes=nodes,
+            positions_m=positions,
+            lines=lines,
+            faces=faces_between_lines(lines, positions),
+            marks=[mark for mark in marks if mark["rows"]],
+        )
+
+    @property
+    def extent_m(self) -> float:
+        """The largest extent along an axis; 1 where there is none."""
+        return (float(np.ptp(self.positions_m, axis=0).max()) if len(self.nodes) else 0.0) or 1.0
+
+    @property
+    def is_row(self) -> bool:
+        """All nodes lie along x: motions are then drawn upwards, whatever their direction."""
+        return not np.ptp(self.positions_m[:, 1:]) if len(self.nodes) else True
+
+    def to_json(self) -> dict[str, Any]:
+        """Give what the page's script draws.
+
+        Returns
+        -------
+        dict
+            ``at`` (n_nodes, 3) in steps of the largest extent, ``lines``, ``faces``, ``marks``, ``nodes``, ``isRow``
+            and ``reach``, how far it moves at most.
+        """
+        middle = (self.positions_m.max(axis=0) + self.positions_m.min(axis=0)) / 2 if len(self.nodes) else 0.0
+        return {
+            "nodes": self.nodes.tolist(),
+            "at": _steps(self.positions_m - middle, self.extent_m),
+            "lines": self.lines,
+            "faces": self.faces,
+            "marks": self.marks,
+            "isRow": self.is_row,
+            "reach": REACH * STEPS,
+        }
+
+
+def _nodes_of(dof: AnyDof, ports: Mapping[str, tuple[int, ...]]) -> tuple[int, ...]:
+    return ports.get(dof.name, ()) if isinstance(dof, PortDof) else (dof.node,)
+
+
+def draw_shape(shape: Shape, structure: Structure) -> dict[str, Any]:
+    """Say how far each point of a drawing moves.
 
     Parameters
     ----------
     shape : Shape
         Measured and models.
-    geometry : Geometry, optional
-        Where the nodes are; without it they stand in a row.
+    structure : Structure
+        What is drawn.
 
     Returns
     -------
     dict
-        ``title``, ``lines`` as pairs of points, ``frame`` (left, top, width, height), ``motions``, each with its
-        points, ``at`` and ``move`` (real and imaginary part across and up), and whether it has ``lines``.
+        ``title`` and ``motions``, each with ``name``, ``title``, ``rows`` of the structure, ``real`` and ``imag``
+        (n, 3) in steps of the largest extent, and ``isWhole``: it moves all nodes.
     """
-    nodes, positions, lines = _plan(geometry, shape.motions)
-    is_row = not np.ptp(positions[:, 1:]) if len(nodes) else True
-    extent = (float(np.ptp(positions, axis=0).max()) if len(nodes) else 0.0) or 1.0
-    node_rows = {int(node): row for row, node in enumerate(nodes)}
-    moves = [_move(motion, node_rows, is_row=is_row) for motion in shape.motions]
-    scale = _scale(shape, [move for _, move in moves], extent)
-    ground = _project(positions, is_row=is_row)
-    drawn = [
-        {
-            "name": motion.name,
-            "title": motion.title,
-            "at": _digits(ground[rows], extent),
-            "move": _digits(np.concatenate([scale * move.real, scale * move.imag], axis=1), extent),
-            "nodes": [int(node) for node in nodes[rows]],
-            "hasLines": len(rows) == len(nodes),
-        }
-        for motion, (rows, move) in zip(shape.motions, moves, strict=True)
-    ]
+    moves = [_move(motion, structure) for motion in shape.motions]
+    scale = _scale(shape, [move for _, move in moves])
     return {
         "title": shape.title,
-        "ground": _digits(ground, extent),
-        "lines": [
-            [node_rows[int(a)], node_rows[int(b)]] for a, b in lines if int(a) in node_rows and int(b) in node_rows
+        "motions": [
+            {
+                "name": motion.name,
+                "title": motion.title,
+                "rows": rows.tolist(),
+                "real": _steps(scale * move.real, 1.0),
+                "imag": _steps(scale * move.imag, 1.0),
+                "isWhole": len(rows) == len(structure.nodes),
+            }
+            for motion, (rows, move) in zip(shape.motions, moves, strict=True)
         ],
-        "frame": _frame(ground, extent, is_row=is_row),
-        "motions": drawn,
     }
 
 
-def _plan(geometry: Geometry | None, motions: Sequence[Motion]) -> tuple[IntArray, FloatArray, IntArray]:
-    """Nodes, their positions in space, and lines as pairs of nodes."""
-    if geometry is None:
-        named = {dof.node for motion in motions for dof in node_dofs(motion.dofs)}
-        nodes = np.array(sorted(node for node in named if node > 0), np.int64)
-        positions = np.zeros((len(nodes), 3))
-        positions[:, 0] = nodes
-        return nodes, positions, np.stack([nodes[:-1], nodes[1:]], 1)
-    if len(geometry.nodes) <= MOST_NODES:
-        return geometry.nodes, geometry.coordinates_m, geometry.lines
-    measured = {dof.node for motion in motions if motion.name == "measured" for dof in node_dofs(motion.dofs)}
-    is_drawn = np.isin(geometry.nodes, list(measured))
-    is_drawn[:: -(-len(geometry.nodes) // MOST_NODES)] = True
-    return geometry.nodes[is_drawn], geometry.coordinates_m[is_drawn], geometry.lines
-
-
-def _move(motion: Motion, node_rows: dict[int, int], *, is_row: bool) -> tuple[IntArray, ComplexArray]:
-    """Which points move, and how, across and up. In a row of nodes all motion is drawn upwards."""
+def _move(motion: Motion, structure: Structure) -> tuple[IntArray, ComplexArray]:
+    """Which points move, and how. In a row of nodes all motion is drawn upwards."""
+    places = {int(node): row for row, node in enumerate(structure.nodes)}
     moved: dict[int, ComplexArray] = {}
     for dof, value in zip(motion.dofs, motion.values, strict=True):
-        if isinstance(dof, Dof) and dof.direction in AXES and dof.node in node_rows:
-            moved.setdefault(node_rows[dof.node], np.zeros(3, complex))[AXES[dof.direction]] = value
-    if len(moved) > len(node_rows) / 2:  # a model that knows nearly all nodes: the others are held
-        moved = {row: moved.get(row, np.zeros(3, complex)) for row in node_rows.values()}
+        if isinstance(dof, Dof) and dof.direction in AXES and dof.node in places:
+            moved.setdefault(places[dof.node], np.zeros(3, complex))[AXES[dof.direction]] = value
+    if len(moved) > len(places) / 2:  # a model that knows nearly all nodes: the others are held
+        moved = {row: moved.get(row, np.zeros(3, complex)) for row in places.values()}
     rows = sorted(moved)
     space = np.array([moved[row] for row in rows], complex).reshape(-1, 3)
-    if is_row:
+    if structure.is_row:
         axis = int(np.argmax(np.abs(space).sum(axis=0)))
-        space = np.stack([np.zeros(len(space)), space[:, axis], np.zeros(len(space))], 1)
-    return np.array(rows, int), _project(space, is_row=is_row)
+        space = np.stack([np.zeros(len(space)), np.zeros(len(space)), space[:, axis]], 1)
+    return np.array(rows, int), space
 
 
-def _project(points: Any, *, is_row: bool) -> Any:  # noqa: ANN401  positions are real, motions complex
-    x, y, z = points.T
-    if is_row:
-        return np.stack([x, y], 1)
-    return np.stack([(x - y) * np.cos(np.pi / 6), z + (x + y) * np.sin(np.pi / 6)], 1)
+def _scale(shape: Shape, moves: Sequence[ComplexArray]) -> float:
+    """Give the share of the extent for a motion of 1.
 
-
-def _scale(shape: Shape, moves: Sequence[ComplexArray], extent: float) -> float:
-    """Metres drawn for a motion of 1: a model that is far off must not leave the measurement without a visible one."""
+    A model that is far off must not leave the measurement without a visible one.
+    """
     sizes = {
-        motion.name: float(np.abs(move).max(initial=0.0)) for motion, move in zip(shape.motions, moves, strict=True)
+        motion.name: float(np.linalg.norm(move, axis=1).max(initial=0.0))
+        for motion, move in zip(shape.motions, moves, strict=True)
     }
     largest = min(max(sizes.values(), default=0.0), MOST_BEYOND * sizes.get("measured", np.inf))
-    return REACH * extent / largest if largest > 0 else 0.0
+    return REACH / largest if largest > 0 else 0.0
 
 
-def _frame(ground: FloatArray, extent: float, *, is_row: bool) -> list[float]:
-    if not len(ground):
-        return [0.0, 0.0, 1.0, 1.0]
-    margin = TALL * REACH * extent * np.array([BESIDE if is_row else 1.0, 1.0])
-    low, high = ground.min(axis=0) - margin, ground.max(axis=0) + margin
-    return [float(low[0]), float(low[1]), float(high[0] - low[0]), float(high[1] - low[1])]
-
-
-def _digits(values: FloatArray, extent: float) -> list[list[float]]:
-    """Numbers with the digits that a screen can show."""
-    digits = max(0, 4 - int(np.floor(np.log10(extent))))
-    return [[round(float(value), digits) for value in row] for row in values]
+def _steps(values: FloatArray, extent: float) -> list[list[int]]:
+    return np.round(STEPS * values / extent).astype(int).tolist()  # type: ignore[no-any-return]
