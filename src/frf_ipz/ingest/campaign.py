@@ -88,6 +88,25 @@ class Channel:
         return numerator_of(self.sensitivity) if self.sensitivity else self.unit
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SecondRecorder:
+    """A second recorder's files of the same records.
+
+    Parameters
+    ----------
+    files : tuple of Path
+        One for each file of the set-up, in the same order.
+    columns : tuple of pairs of str
+        Channels that it recorded, and what its files call them; ``time`` or ``sample_rate_hz`` too.
+    common : pair of str, optional
+        A channel that both recorded, and what the second calls it; without it both begin by one trigger.
+    """
+
+    files: tuple[Path, ...]
+    columns: tuple[tuple[str, str], ...]
+    common: tuple[str, str] | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class TestSetup(Concise):
     """Recordings with the force at one DOF and the sensors in one layout.
@@ -104,6 +123,8 @@ class TestSetup(Concise):
         Columns of channels, ``time`` or ``sample_rate_hz``, and what these files call them.
     further_input_dofs : tuple of Dof or PortDof
         Where the other forces act, in the order of their channels, where several act at once.
+    second_recorder : SecondRecorder, optional
+        Where some channels stand in files of their own.
 
     Examples
     --------
@@ -131,6 +152,7 @@ class TestSetup(Concise):
     files: tuple[Path, ...]
     variables: tuple[tuple[str, str], ...] = ()
     further_input_dofs: tuple[AnyDof, ...] = ()
+    second_recorder: SecondRecorder | None = None
 
     @property
     def input_dofs(self) -> tuple[AnyDof, ...]:
@@ -632,6 +654,7 @@ class VibrationTest(Concise):
     def files(self) -> tuple[Path, ...]:
         """All files of measurements, each once."""
         recordings = [path for _, path in self.recordings if path not in self.signals]
+        recordings += [path for setup in self.setups if setup.second_recorder for path in setup.second_recorder.files]
         modes = [] if self.modes_path is None else [self.modes_path]
         return tuple(dict.fromkeys([*recordings, *(source.path for source in self.frf_sources), *modes]))
 

@@ -16,6 +16,7 @@ from frf_ipz.ingest.campaign import (
     RATE_VARIABLE,
     TIME_VARIABLE,
     Channel,
+    SecondRecorder,
     TestSetup,
     VibrationTest,
     setup_labels,
@@ -128,6 +129,28 @@ class ChannelKeys:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SecondRecorderKeys:
+    """``second_recorder`` of ``[[hit]]`` or ``[[record]]``: some channels stand in files of their own.
+
+    Parameters
+    ----------
+    files : tuple of str
+        Globs; sorted, they are as many as the entry's own ``files`` and in the same order.
+    columns : dict of str to str
+        Column of a channel that this recorder has, and what its files call it; ``time`` and ``sample_rate_hz`` too.
+    common : dict of str to str
+        Column of a channel that the first recorder has, and what this one calls the same signal: the records are
+        aligned by it. Without it both are taken to begin by one trigger, as the times in their files say.
+    """
+
+    __pydantic_config__ = STRICT
+
+    files: tuple[str, ...]
+    columns: dict[str, str]
+    common: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SetupKeys:
     """``[[hit]]`` of a hammer or ``[[record]]`` of a shaker: one entry for each excited DOF.
 
@@ -144,6 +167,8 @@ class SetupKeys:
     variables : dict of str to str
         Column of a channel, and what these files call it, where that differs; ``time`` and ``sample_rate_hz`` too.
         In files of arrays a name, or a column as in ``data(:,2)`` (counted from 1) or ``data[:,1]`` (from 0).
+    second_recorder : SecondRecorderKeys, optional
+        Files of a second recorder that ran at the same time, with the channels that it has.
     """
 
     __pydantic_config__ = STRICT
@@ -153,6 +178,7 @@ class SetupKeys:
     input_dofs: dict[str, str] = field(default_factory=dict)
     output_dofs: dict[str, str] = field(default_factory=dict)
     variables: dict[str, str] = field(default_factory=dict)
+    second_recorder: SecondRecorderKeys | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -504,13 +530,40 @@ def _read_setup(path: Path, keys: SetupKeys, channels: tuple[Channel, ...], wher
     files = [file for pattern in keys.files for file in _expand_pattern(path, pattern, where)]
     if not files:
         raise FileFormatError(path, "'files' is empty; name at least one recording", where=where)
+    files = list(dict.fromkeys(files))
+    columns = [channel.column for channel in channels]
+    second = keys.second_recorder
     return TestSetup(
         input_dof=input_dofs[0],
         further_input_dofs=input_dofs[1:],
         output_dofs=output_dofs,
-        files=tuple(dict.fromkeys(files)),
-        variables=_read_variables(path, keys.variables, [channel.column for channel in channels], where),
+        files=tuple(files),
+        variables=_read_variables(path, keys.variables, columns, where),
+        second_recorder=None if second is None else _read_second_recorder(path, second, files, columns, where),
     )
+
+
+def _read_second_recorder(
+    path: Path, keys: SecondRecorderKeys, files: Sequence[Path], columns: Sequence[str], where: str
+) -> SecondRecorder:
+    where = f"{where}, second_recorder"
+    own = _read_variables(path, keys.columns, columns, where, key="columns")
+    common = _read_variables(path, keys.common, columns, where, key="common")
+    moved = [name for name, _ in own if name in columns]
+    if not moved or len(moved) == len(columns):
+        problem = "'columns' names the channels that this recorder has: at least one, and not all of them"
+        raise FileFormatError(path, problem, where=where)
+    if len(common) > 1 or any(name in moved or name not in columns for name, _ in common):
+        problem = "'common' names one channel that the first recorder has, and what this one calls it"
+        raise FileFormatError(path, f'{problem}, as in common = {{ force = "trigger" }}', where=where)
+    found = dict.fromkeys(file for pattern in keys.files for file in _expand_pattern(path, pattern, where))
+    if len(found) != len(files):
+        problem = f"its 'files' are {len(found)} and those of the first recorder {len(files)}"
+        raise FileFormatError(path, f"{problem}; each record has one file of each recorder, in one order", where=where)
+    both = next((file for file in found if file in files), None)
+    if both is not None:
+        raise FileFormatError(path, f"{both.name} is a file of both recorders; correct 'files'", where=where)
+    return SecondRecorder(files=tuple(found), columns=own, common=common[0] if common else None)
 
 
 def _read_input_dofs(path: Path, keys: SetupKeys, inputs: list[Channel], where: str) -> tuple[AnyDof, ...]:
@@ -541,12 +594,12 @@ def _read_input_dofs(path: Path, keys: SetupKeys, inputs: list[Channel], where: 
 
 
 def _read_variables(
-    path: Path, variables: Mapping[str, str], columns: Iterable[str], where: str
+    path: Path, variables: Mapping[str, str], columns: Iterable[str], where: str, *, key: str = "variables"
 ) -> tuple[tuple[str, str], ...]:
     known = [*columns, TIME_VARIABLE, RATE_VARIABLE]
     for name in variables:
         if name not in known:
-            problem = f"'variables' names '{name}', which is no column of a [[channel]]; {did_you_mean(name, known)}"
+            problem = f"'{key}' names '{name}', which is no column of a [[channel]]; {did_you_mean(name, known)}"
             raise FileFormatError(path, problem, where=where)
     return tuple(variables.items())
 

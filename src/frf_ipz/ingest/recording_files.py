@@ -6,13 +6,14 @@ Files are streamed; small ones are cached within a fixed budget of memory, since
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.ingest.formats.registry import open_recording
+from frf_ipz.ingest.signals.alignment import AGREES, Alignment, align, join
 from frf_ipz.ingest.units import is_stated, sensitivity_factor, unit_factor, unit_ratio
 
 if TYPE_CHECKING:
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.dofs import AnyDof
-    from frf_ipz.ingest.campaign import Channel, TestSetup, VibrationTest
-    from frf_ipz.ingest.formats.recording import RawRecording
+    from frf_ipz.ingest.campaign import Channel, SecondRecorder, TestSetup, VibrationTest
+    from frf_ipz.ingest.formats.recording import RawRecording, TableKeys
 
 BUDGET = 64_000_000  # bytes of recordings that are cached
 UNIFORM = 0.01  # of the median step: the contract's limit for a step that differs
@@ -44,14 +45,29 @@ class RecordingFiles:
     _cache: dict[Path, FloatArray] = field(default_factory=dict)
     _cached_bytes: int = 0
     _notes: dict[str, dict[Path, None]] = field(default_factory=dict)
+    _alignments: dict[Path, Alignment] = field(default_factory=dict)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What had to be chosen in the files that were read so far, each once."""
-        return tuple(
+        notes = [
             f"{next(iter(paths)).name}{f' and {len(paths) - 1} more' if len(paths) > 1 else ''}: {note}"
             for note, paths in self._notes.items()
-        )
+        ]
+        return (*notes, *self._alignment_notes())
+
+    def _alignment_notes(self) -> list[str]:
+        if not self._alignments:
+            return []
+        found = list(self._alignments.values())
+        delays = sorted(1e3 * alignment.delay_s for alignment in found)
+        span = f"{delays[0]:.4g} ms" if delays[0] == delays[-1] else f"{delays[0]:.4g} to {delays[-1]:.4g} ms"
+        std = 1e3 * max(alignment.std_s for alignment in found)
+        common = {setup.second_recorder.common for setup in self.test.setups if setup.second_recorder} - {None}
+        how = "the cross-correlation of what both recorded" if common else "the trigger, at the times in their files"
+        rates = [1e6 * alignment.drift for alignment in found if alignment.drift]
+        drift = f", its clock off by up to {max(map(abs, rates)):.2g} ppm" if rates else ""
+        return [f"second recorder: it began {span} after the first (+- {std:.2g} ms) by {how}{drift}"]
 
     def blocks(self, setup: TestSetup, path: Path) -> Iterator[FloatArray]:
         """Give a recording block by block.
@@ -123,27 +139,77 @@ class RecordingFiles:
             n_rows += len(block)
 
     def _read(self, setup: TestSetup, path: Path) -> Iterator[FloatArray]:
-        channels = self.test.channels
-        columns = setup.names_in_files([channel.column for channel in channels])
-        recording = open_recording(path, columns, setup.keys_for_files(self.test.table))
+        if setup.second_recorder is None:
+            columns = setup.names_in_files([channel.column for channel in self.test.channels])
+            blocks = self._read_file(setup, path, range(len(columns)), columns, setup.keys_for_files(self.test.table))
+        else:
+            blocks = iter([self._read_both(setup, setup.second_recorder, path)])
+        start_s: float | None = None
+        for block in blocks:
+            if self.test.applied_window_s is not None:
+                start_s = block[0, 0] if start_s is None and len(block) else start_s
+                _take_back_window(path, block, start_s or 0.0, self.test.applied_window_s)
+            yield block
+
+    def _read_file(
+        self, setup: TestSetup, path: Path, places: Sequence[int], columns: Sequence[str], keys: TableKeys
+    ) -> Iterator[FloatArray]:
+        """Give time and some channels of a file, SI: those at `places` among all, which it calls `columns`."""
+        recording = open_recording(path, columns, keys)
         for note in recording.notes:
             self._notes.setdefault(note, {})[path] = None
         dofs = (*setup.input_dofs, *setup.output_dofs)
         factors = [_time_factor(recording)]
         factors += [
-            _channel_factor(path, channel, dof, file_unit)
-            for channel, dof, file_unit in zip(channels, dofs, recording.units[1:], strict=True)
+            _channel_factor(path, self.test.channels[place], dofs[place], file_unit)
+            for place, file_unit in zip(places, recording.units[1:], strict=True)
         ]
         time_check = UniformTimeCheck(recording)
-        start_s: float | None = None
         for block in recording.blocks:
             block *= factors  # in place: the block is ours, and copies cost time
             time_check.add(block[:, 0])
-            if self.test.applied_window_s is not None:
-                start_s = block[0, 0] if start_s is None and len(block) else start_s
-                _take_back_window(path, block, start_s or 0.0, self.test.applied_window_s)
             yield block
         time_check.finish()
+
+    def _read_both(self, setup: TestSetup, recorder: SecondRecorder, path: Path) -> FloatArray:
+        """Put what a second recorder has beside what the first has, on the first's time."""
+        names = [channel.column for channel in self.test.channels]
+        own = dict(recorder.columns)
+        first = [place for place, name in enumerate(names) if name not in own]
+        second = [place for place, name in enumerate(names) if name in own]
+        columns = setup.names_in_files([names[place] for place in first])
+        keys = setup.keys_for_files(self.test.table)
+        table = np.concatenate(list(self._read_file(setup, path, first, columns, keys)))
+        other = recorder.files[setup.files.index(path)]
+        places, columns_there = list(second), [own[names[place]] for place in second]
+        if recorder.common is not None:
+            places, columns_there = [*places, names.index(recorder.common[0])], [*columns_there, recorder.common[1]]
+        there = replace(setup, variables=recorder.columns).keys_for_files(self.test.table)
+        other_table = np.concatenate(list(self._read_file(setup, other, places, columns_there, there)))
+        steps = [float(part[-1, 0] - part[0, 0]) / (len(part) - 1) for part in (table, other_table)]
+        if abs(steps[1] / steps[0] - 1.0) > UNIFORM:
+            problem = f"has a time step of {steps[1]:.6g} s, and {path.name} of the first recorder {steps[0]:.6g} s"
+            raise FileFormatError(other, f"{problem}; record with one rate, or resample")
+        if recorder.common is None:
+            alignment = Alignment(delay_s=float(other_table[0, 0] - table[0, 0]), std_s=steps[0] / math.sqrt(6.0))
+        else:
+            column = 1 + first.index(places[-1])
+            alignment = align(table[:, column], other_table[:, -1], *steps)
+            other_table = other_table[:, :-1]
+            if alignment.explained < AGREES:
+                problem = (
+                    f"its '{recorder.common[1]}' is not '{recorder.common[0]}' of {path.name}: shifted, they share"
+                )
+                way_out = "correct 'common' of second_recorder, or the order of its 'files'"
+                raise FileFormatError(
+                    other, f"{problem} {100 * max(alignment.explained, 0.0):.0f} % of the power; {way_out}"
+                )
+        joined = join(table, other_table, alignment)
+        if len(joined) < FEWEST_SAMPLES:
+            raise FileFormatError(other, f"was not recorded at the time of {path.name}; correct 'files'")
+        self._alignments[other] = alignment
+        order = np.argsort([*first, *second])
+        return np.column_stack([joined[:, 0], joined[:, 1:][:, order]])
 
 
 class UniformTimeCheck:
