@@ -40,6 +40,7 @@ from frf_ipz.identification.search.find_modes import (
     mode_order,
     variance_factors,
 )
+from frf_ipz.identification.search.force_error import ForceError
 from frf_ipz.identification.search.goodness_of_fit import assess_fit
 from frf_ipz.identification.search.split_half import (
     SplitHalf,
@@ -191,6 +192,7 @@ def fit_residues(frfs: FrfSet, *, poles: ComplexArray, options: FitOptions | Non
         noise=lines.variance,
         noise_from="recordings" if lines.known.all() else "misfit",
         drift=drift,
+        force_error=None,
         start=pd.DataFrame(columns=["order", "frequency_hz", "damping_ratio"]),
         decisions=(),
         delay_s=np.zeros(frfs.n_frfs),
@@ -220,8 +222,13 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
     misfit = lines.receptance - response(fit.system, terms, lines.s)
     of_frfs = pd.DataFrame({"delay_s": fitted.delay_s, "gain": gains.of_frf, "gain_std": gains.of_frf_std})
     misfit_frame = misfit_table(lines.frequency_hz, misfit * unit, np.sqrt(fitted.noise) * unit, frfs.labels)
+    model = measured_model(fit.system, terms, lines.powers, order, fitted.delay_s)
+    # what an error of the force is at the poles themselves, residues have followed
+    common = np.zeros(frfs.n_frfs) if fitted.force_error is None else fitted.force_error.rms_of_frfs
+    of_force = common**2 / 2 * np.abs(model.residues[:n_modes]) ** 2
+    values = np.abs(response(fit.system, terms, lines.s)) * unit
     return ModalFit(
-        model=measured_model(fit.system, terms, lines.powers, order, fitted.delay_s),
+        model=model,
         n_modes=n_modes,
         labels=frfs.labels,
         band_hz=lines.band_hz,
@@ -229,8 +236,8 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
         frequency_hz=frfs.frequency_hz[lines.used],
         zeros=zeros.zeros,
         covariance=_root_covariance(errors, zeros, modes),
-        residue_covariance=residue_covariance(errors, lines.powers, modes),
-        value_std=value_std(errors, lines.s) * unit,
+        residue_covariance=residue_covariance(errors, lines.powers, modes) + of_force[:, :, None, None] * np.eye(2),
+        value_std=np.hypot(value_std(errors, lines.s) * unit, common * values),
         stabilization=columns_of_modes(fitted.start, natural_frequency_hz(fit.poles[modes]), options.stability),
         stability=options.stability,
         decisions=_decisions(fitted, modes, unconfirmed),
@@ -316,9 +323,24 @@ def _warnings(
             f"responses come later than the force, or before it, each by its own delay, which the fit takes off: "
             f"{listed}; [fit] delay = false fits none"
         )
+    if fitted.force_error is not None:
+        texts.append(_force_error_text(frfs, fitted.force_error))
     if fitted.drift is not None:
         texts.append(_drift_warning(frfs, fitted.drift, against_poles=fitted.poles_are_held))
     return tuple(texts)
+
+
+def _force_error_text(frfs: FrfSet, error: ForceError) -> str:
+    dofs = [str(label.input_dof) for label in frfs.labels]
+    of_dofs = [
+        f"{dof} {rms:.2g} ({1e3 * window_s:.3g} ms)"
+        for dof, rms, window_s in zip(np.unique(dofs), error.rms, error.window_s, strict=True)
+        if rms > 0
+    ]
+    return (
+        "all FRFs of an excited DOF are off by one factor that is smooth over the lines, as noise of the force in its "
+        f"window makes it, which the fit takes off instead of broad modes; relative size (time): {', '.join(of_dofs)}"
+    )
 
 
 def _drift_warning(frfs: FrfSet, drift: Drift, *, against_poles: bool) -> str:

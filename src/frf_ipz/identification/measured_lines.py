@@ -42,6 +42,8 @@ class WeightedLines:
         Weights where profile times gain is not good enough.
     real_modes : bool
         Residues of receptances are imaginary, as those of normal modes.
+    force : (n_frfs,) int array or None
+        Which FRFs share a force, by its number.
     sums : dict
         What the compression has made of the lines, by the powers and the scale of the smooth terms.
     """
@@ -52,6 +54,7 @@ class WeightedLines:
     gain: FloatArray
     full: FloatArray | None = None
     real_modes: bool = False
+    force: IntArray | None = None
     sums: dict[tuple[tuple[int, ...], float], tuple[LineSums, FloatArray]] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -87,6 +90,8 @@ class MeasuredLines:
         Which lines of the FrfSet these are.
     powers : (n_frfs,) int array
         Power of s that makes each FRF out of a receptance.
+    force : (n_frfs,) int array
+        Which FRFs share a force, by its number.
     """
 
     frequency_hz: FloatArray
@@ -96,6 +101,7 @@ class MeasuredLines:
     known: BoolArray
     used: BoolArray
     powers: IntArray
+    force: IntArray
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -141,7 +147,12 @@ class MeasuredLines:
         spread = log_weight - gain - profile[:, None]
         full = np.exp(log_weight) if not shared and np.sqrt(np.mean(spread**2)) > SHARED_SPREAD else None
         return WeightedLines(
-            s=self.s, receptance=self.receptance, profile=np.exp(profile), gain=np.exp(gain), full=full
+            s=self.s,
+            receptance=self.receptance,
+            profile=np.exp(profile),
+            gain=np.exp(gain),
+            full=full,
+            force=self.force,
         )
 
 
@@ -193,6 +204,7 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
         known=known,
         used=used,
         powers=powers,
+        force=np.unique([str(label.input_dof) for label in frfs.labels], return_inverse=True)[1],
     )
 
 

@@ -30,6 +30,7 @@ from frf_ipz.identification.search.arrivals import find_arrival
 from frf_ipz.identification.search.delays import CommonDelay, common_delay, each_delay, explains_misfit, measure_delay
 from frf_ipz.identification.search.discrepancy import with_discrepancy
 from frf_ipz.identification.search.drift import Drift
+from frf_ipz.identification.search.force_error import ForceError
 from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, assess_fit, peak_levels
 from frf_ipz.identification.search.selection import ROUGH_ITERATIONS, SelectedModes, select_modes
 from frf_ipz.identification.search.spurious_poles import half_widths_apart
@@ -76,6 +77,8 @@ class FittedModes:
         ``recordings`` or ``misfit``.
     drift : Drift or None
         The drift, where there is one.
+    force_error : ForceError or None
+        The error of the force that FRFs share, where there is one.
     start : DataFrame
         Start poles.
     decisions : tuple of dict
@@ -98,6 +101,7 @@ class FittedModes:
     noise: FloatArray
     noise_from: str
     drift: Drift | None
+    force_error: ForceError | None
     start: pd.DataFrame
     decisions: tuple[dict[str, object], ...]
     delay_s: FloatArray
@@ -330,6 +334,7 @@ def _against_model_error(fitted: FittedModes, options: FitOptions) -> FittedMode
         misfit_ratio=np.sqrt(np.sum(squares / fitted.noise, axis=0) / degrees_of_freedom),
         noise=fitted.noise,
         drift=refitted.drift or fitted.drift,
+        force_error=refitted.force_error or fitted.force_error,
         decisions=(
             *fitted.decisions,
             *(decision for decision in refitted.decisions if decision["action"] in ("added", "dropped")),
@@ -389,6 +394,7 @@ def _refine_with_final_weights(
         noise=noise,
         noise_from=noise_from,
         drift=selected.drift,
+        force_error=selected.force_error,
         start=start,
         decisions=selected.decisions,
         delay_s=delay_s,

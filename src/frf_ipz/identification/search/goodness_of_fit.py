@@ -200,6 +200,26 @@ def over_bic(drops: FloatArray, n_numbers: int) -> FloatArray:
     return np.asarray(np.max(cumulated_drops(drops) / bic_penalty(drops.shape[1], n_numbers), axis=1, initial=0.0))
 
 
+def demanded_by_bic(goodness: GoodnessOfFit, n_numbers: int) -> FloatArray:
+    """Give what the BIC demands of each pole, in the FRFs that show it best.
+
+    Parameters
+    ----------
+    goodness : GoodnessOfFit
+        What the poles take off.
+    n_numbers : int
+        Real numbers that an FRF has.
+
+    Returns
+    -------
+    (n_poles,) array
+        To be added to minus twice the log likelihood.
+    """
+    drops = cumulated_drops(goodness.drops)
+    penalty = bic_penalty(drops.shape[1], n_numbers)
+    return np.asarray(penalty[np.argmax(drops - penalty, axis=1)])
+
+
 def cumulated_drops(drops: FloatArray) -> FloatArray:
     """Give what a pole takes off in the one, two ... FRFs where it takes off most, (n_poles, n_frfs)."""
     return np.asarray(np.cumsum(-np.sort(-drops, axis=1), axis=1))

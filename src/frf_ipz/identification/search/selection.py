@@ -6,12 +6,20 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import special
 
-from frf_ipz.arrays import BoolArray, ComplexArray
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
+from frf_ipz.identification.likelihood.compression import response
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
 from frf_ipz.identification.measured_lines import WeightedLines
 from frf_ipz.identification.search.drift import Drift, find_drift
-from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, assess_fit
+from frf_ipz.identification.search.force_error import ForceError, find_force_error
+from frf_ipz.identification.search.goodness_of_fit import (
+    GoodnessOfFit,
+    assess_fit,
+    demanded_by_bic,
+    over_bic,
+)
 from frf_ipz.identification.search.hum import find_hum
 from frf_ipz.identification.search.spurious_poles import DEMANDED, find_spurious_poles
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
@@ -28,6 +36,7 @@ SURE = 6.0  # times what the BIC demands: such a pole stays even where its dampi
 NEAR_PIN = 0.02  # relative distance up to which a pole is the one that was pinned or rejected
 MODEL_ERROR = 1.7  # mean square of the misfit over that of noise, above which the model is to blame
 PIN_REASON = "the user says that a mode is here"  # of a pin without a reason
+FORCE_REASON = "an error of the force that is smooth over the lines explains the misfit as well"
 NEAR_REFUSED = 2.0  # half widths within which a refused pole is not proposed again
 
 
@@ -41,6 +50,8 @@ class SelectedModes:
         The fitted lines: FRFs moved to their mean frequencies where the structure drifted.
     drift : Drift or None
         The drift, where there is one.
+    force_error : ForceError or None
+        The error of the force that FRFs share, where there is one: it is taken off the FRFs.
     fit : RefinedPoles
         Poles and residues.
     goodness : GoodnessOfFit
@@ -51,6 +62,7 @@ class SelectedModes:
 
     data: WeightedLines
     drift: Drift | None
+    force_error: ForceError | None
     fit: RefinedPoles
     goodness: GoodnessOfFit
     decisions: tuple[dict[str, object], ...]
@@ -64,8 +76,10 @@ class _Search:
     terms: SmoothTerms
     pinned: tuple[tuple[float, str], ...]
     rejected: tuple[tuple[float, str], ...]
-    noise_is_trusted: bool
+    noise_is_known: bool
+    noise_is_trusted: bool = True
     drift: Drift | None = None
+    force_error: ForceError | None = None
     refused: list[complex] = field(default_factory=list)
     decisions: list[dict[str, object]] = field(default_factory=list)
 
@@ -100,17 +114,32 @@ def select_modes(
     """
     rejected = tuple((pole.hz, pole.why) for pole in options.strike)
     pinned = tuple((pole.hz, pole.why) for pole in options.pinned)
-    search = _Search(data=data, terms=terms, pinned=pinned, rejected=rejected, noise_is_trusted=noise_is_known)
+    search = _Search(data=data, terms=terms, pinned=pinned, rejected=rejected, noise_is_known=noise_is_known)
     poles = _with_pinned(search, _without_rejected(search, poles))
     # start poles are not many, and neither errors of strong modes nor tails of weak ones show yet
     start = refine_poles(data, poles, terms, iterations=ROUGH_ITERATIONS)
+    fit, goodness = _without_force_error(search, *_add_and_drop(search, start))
+    return SelectedModes(
+        data=search.data,
+        drift=search.drift,
+        force_error=search.force_error,
+        fit=fit,
+        goodness=goodness,
+        decisions=tuple(search.decisions),
+    )
+
+
+def _add_and_drop(search: _Search, start: RefinedPoles) -> tuple[RefinedPoles, GoodnessOfFit]:
+    search.noise_is_trusted = search.noise_is_known
     fit, goodness = _drop_insignificant(search, start, spurious_too=False)
     for _ in range(ROUNDS):
         fit, goodness = _without_drift(search, fit, goodness)
         proposed = _proposed_poles(search, goodness)
         if not len(proposed):
             break
-        trial = refine_poles(search.data, np.concatenate([fit.poles, proposed]), terms, iterations=ROUGH_ITERATIONS)
+        trial = refine_poles(
+            search.data, np.concatenate([fit.poles, proposed]), search.terms, iterations=ROUGH_ITERATIONS
+        )
         search.refused.extend(trial.discarded.tolist())
         trial, trial_goodness = _drop_insignificant(search, trial)
         if len(trial.poles) <= len(fit.poles) and trial.misfit > fit.misfit:
@@ -119,11 +148,70 @@ def select_modes(
             search.refused.clear()  # they were compared with a misfit that was not noise
         search.record(*_added_poles(fit.poles, trial.poles))
         fit, goodness = trial, trial_goodness
-    search.noise_is_trusted = search.noise_is_trusted and bool(np.median(goodness.level) < MODEL_ERROR)
-    fit, goodness = _drop_insignificant(search, fit)
-    return SelectedModes(
-        data=search.data, drift=search.drift, fit=fit, goodness=goodness, decisions=tuple(search.decisions)
+    search.noise_is_trusted = search.noise_is_known and bool(np.median(goodness.level) < MODEL_ERROR)
+    return _drop_insignificant(search, fit)
+
+
+def _without_force_error(
+    search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit
+) -> tuple[RefinedPoles, GoodnessOfFit]:
+    """Take the error of the force off where poles stand that it could make, and it explains the lines better."""
+    doubts = _doubts(search, fit, goodness)
+    # where the model cannot follow to the noise, its level takes the place of the noise: one for all FRFs
+    level = np.exp(np.log(goodness.level).mean(axis=1))
+    weighed = replace(search.data, profile=search.data.profile / np.sqrt(level))
+    found = _error_beside_best_poles(search, weighed, fit, goodness, doubts)
+    if found is None:
+        return fit, goodness
+    error, beside = found
+    corrected = replace(
+        search,
+        data=replace(search.data, receptance=error.receptance),
+        force_error=error,
+        refused=[],
+        decisions=list(search.decisions),
     )
+    other = refine_poles(corrected.data, beside.poles, search.terms, iterations=ROUGH_ITERATIONS)
+    other, other_goodness = _add_and_drop(corrected, other)
+    n_numbers = 2 * len(level)
+    before = _misfit(search, weighed, fit) + np.sum(demanded_by_bic(goodness, n_numbers))
+    after = _misfit(corrected, weighed, other) + np.sum(demanded_by_bic(other_goodness, n_numbers)) + error.cost
+    if after > before:
+        return fit, goodness
+    gone, _, _ = _added_poles(other.poles, fit.poles)
+    corrected.record(gone, "dropped", [FORCE_REASON] * len(gone))
+    search.data, search.drift, search.force_error = corrected.data, corrected.drift, error
+    search.decisions, search.refused = corrected.decisions, corrected.refused
+    return other, other_goodness
+
+
+def _error_beside_best_poles(
+    search: _Search, weighed: WeightedLines, fit: RefinedPoles, goodness: GoodnessOfFit, doubts: FloatArray
+) -> tuple[ForceError, RefinedPoles] | None:
+    """Find the error of the force beside the poles, the surest first, that explain the lines best together with it."""
+    n_doubtful = int(np.count_nonzero(doubts > 0))
+    if not 0 < n_doubtful < len(doubts):
+        return None
+    order = np.argsort(doubts)
+    demanded = demanded_by_bic(goodness, 2 * len(weighed.s))
+    best, least, last = None, np.inf, 0
+    for count in range(len(order) - n_doubtful, len(order) + 1):
+        chosen = order[:count]
+        some = refine_poles(search.data, fit.poles[chosen], search.terms, iterations=ROUGH_ITERATIONS)
+        some = refine_poles(weighed, some.poles, search.terms, iterations=0)
+        found = find_force_error(weighed, some, search.terms)
+        length = (found[1].misfit + found[0].cost if found else some.misfit) + demanded[chosen].sum()
+        if length < least:
+            best, least, last = found, length, count
+        elif count > last + 1:  # no better with one more and with two
+            break
+    return best
+
+
+def _misfit(search: _Search, weighed: WeightedLines, fit: RefinedPoles) -> float:
+    """Weigh the misfit with other weights than those it was fitted by."""
+    misfit = search.data.receptance - response(fit.system, search.terms, weighed.s)
+    return float(np.sum(np.abs(misfit * weighed.weight) ** 2))
 
 
 def _without_rejected(search: _Search, poles: ComplexArray) -> ComplexArray:
@@ -183,6 +271,20 @@ def _drop_insignificant(
         search.record(fit.poles[dropped], "dropped", reasons)
         search.refused.extend(fit.poles[dropped].tolist())
         fit = refine_poles(search.data, fit.poles[~dropped], search.terms, iterations=ROUGH_ITERATIONS)
+
+
+def _doubts(search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit) -> FloatArray:
+    """Measure how doubtful poles are where errors are as smooth over the lines as the pole is: above 0 where they are.
+
+    In time a pole decays, and such errors stand in the same short time. So their size there is not known by that of
+    all other times: only the few numbers of that time tell it. Where a pole's square over that of noise is
+    ``x exp(-2 a t)``, it then takes off ``log(1 + x exp(-2 a t))``, and over all times a dilogarithm.
+    """
+    s = search.data.s
+    times = (s.imag[-1] - s.imag[0]) / (2 * np.pi) / (2 * (s.real[0] - fit.poles.real))[:, None]
+    drops = -2 * times * special.spence(1 + goodness.drops / (2 * times))
+    doubts = SURE - over_bic(drops, 2 * len(s))
+    return np.asarray(np.where(_is_pinned(search, fit.poles), np.minimum(doubts, 0.0), doubts))
 
 
 def _spurious_reasons(search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit) -> list[str]:

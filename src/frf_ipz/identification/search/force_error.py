@@ -1,0 +1,216 @@
+"""Error of the force: a smooth factor that all FRFs of one excitation share.
+
+The force of an impact is kept over its pulse and the ringing after it, a few milliseconds, and its noise is kept with
+it. So the FRFs of one excited DOF are all off by one factor ``1 + e(omega)``, and e, the spectrum of so short a time,
+hardly changes over many lines. Residues follow e at their poles. What e changes over the tails of a strong mode they
+cannot follow: it looks like broad modes, on which so many lines agree that a criterion for white noise believes them.
+
+So e is offered as ``sum_k c_k exp(-i omega t_k)`` over the times of a window, with c normally distributed. The size of
+c and the window are those of the highest evidence, c itself being integrated out [MacKay1992]. A size of zero is no
+error at all.
+
+[MacKay1992] D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992, 415-447,
+doi:10.1162/neco.1992.4.3.415.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from frf_ipz.identification.likelihood.compression import model_columns, response
+from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
+from frf_ipz.numerics.partial_fractions import unstacked
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+    from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
+    from frf_ipz.identification.measured_lines import WeightedLines
+
+# how long after the impact, in times of one over the band: a pulse that excites the band lasts one to two of them, and
+# its filter rings for ten
+TAILS = (2, 4, 8, 16, 32)
+LEAD = 0.25  # of that before the impact: pulses are divided by, whose inverse reaches back
+FINER = 2  # coefficients in a time of one over the band: the error does not repeat beyond it
+SIZES = np.geomspace(1e-4, 1e8, 73)  # variances tried, by that of the coefficient that the lines tell best
+MOST_FRFS = 8  # of an excitation, those that weigh most: all have the same error, and few tell it as well
+ROUNDS = 4  # of finding the error, and the modes without it
+ITERATIONS = 4  # of poles, in a round
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ForceError:
+    """Error of the force that FRFs share.
+
+    Parameters
+    ----------
+    relative : (n_lines, n_frfs) complex array
+        By which the FRFs are off.
+    force : (n_frfs,) int array
+        Which FRFs share a force, by its number.
+    window_s : (n_forces,) array
+        How long after the impact each force has its error, s; 0 where it has none.
+    rms : (n_forces,) array
+        Expected relative size.
+    receptance : (n_lines, n_frfs) complex array
+        The receptances without it, m/N.
+    cost : float
+        What it takes off the misfit beyond minus twice the log of the evidence: what it costs, as poles cost what the
+        BIC demands.
+    """
+
+    relative: ComplexArray
+    force: IntArray
+    window_s: FloatArray
+    rms: FloatArray
+    receptance: ComplexArray
+    cost: float
+
+    @property
+    def rms_of_frfs(self) -> FloatArray:
+        """Expected relative size in each FRF, (n_frfs,) array."""
+        return np.asarray(self.rms[np.unique(self.force, return_inverse=True)[1]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Evidence:
+    evidence: float = 0.0
+    coefficients: ComplexArray = field(default_factory=lambda: np.zeros(0, complex))
+    tail: int = 0
+    variance: float = 0.0
+    gain: float = 0.0
+
+
+def find_force_error(
+    data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms
+) -> tuple[ForceError, RefinedPoles] | None:
+    """Find the error of each force, if there is one.
+
+    Parameters
+    ----------
+    data : WeightedLines
+        Lines and weights, the same profile for all FRFs; with the force of each FRF.
+    fit : RefinedPoles
+        A fit of the modes that are beyond doubt.
+    terms : SmoothTerms
+        Terms for modes out of band.
+
+    Returns
+    -------
+    (ForceError, RefinedPoles) or None
+        The error, and the fit to the FRFs without it; None where no force shows an error.
+    """
+    if data.force is None:
+        return None
+    found, least = None, fit.misfit
+    for _ in range(ROUNDS):
+        error = _error_beside(data, data.force, fit, terms)
+        if error is None:
+            break
+        fit = refine_poles(replace(data, receptance=error.receptance), fit.poles, terms, iterations=ITERATIONS)
+        # less than a number is worth by the BIC is no better
+        if fit.misfit + error.cost > least - np.log(2 * len(data.s)):
+            break
+        found, least = (error, fit), fit.misfit + error.cost
+    return found
+
+
+def _error_beside(data: WeightedLines, force: IntArray, fit: RefinedPoles, terms: SmoothTerms) -> ForceError | None:
+    """Find the error of each force beside modes and residues that are known but for small changes."""
+    modelled = response(fit.system, terms, data.s)
+    longest = FINER * max(TAILS)
+    first = -int(LEAD * longest)
+    step_s = 2 * np.pi / (data.s.imag[-1] - data.s.imag[0]) / FINER
+    waves = np.exp(-1j * data.s.imag[:, None] * (step_s * np.arange(first, longest + 1)))
+    basis = _model_basis(data, fit, terms)
+    relative = np.zeros(modelled.shape, complex)
+    forces = np.unique(force)
+    window_s, rms = np.zeros(len(forces)), np.zeros(len(forces))
+    cost = 0.0
+    for number, one in enumerate(forces):
+        of_force = np.flatnonzero(force == one)
+        best = _best_error(data, modelled, basis, waves, of_force)
+        if not best.tail:
+            continue
+        used = _part(best.tail)
+        relative[:, of_force] = (waves[:, used] @ best.coefficients)[:, None]
+        window_s[number] = best.tail * step_s
+        rms[number] = np.sqrt(2 * best.variance * len(best.coefficients))
+        cost += best.gain - best.evidence
+    if not rms.any():
+        return None
+    return ForceError(
+        relative=relative,
+        force=force,
+        window_s=window_s,
+        rms=rms,
+        receptance=data.receptance / (1 + relative),
+        cost=cost,
+    )
+
+
+def _part(tail: int) -> slice:
+    """Select the waves of a window."""
+    before = int(LEAD * FINER * max(TAILS))
+    return slice(before - int(LEAD * tail), before + tail + 1)
+
+
+def _model_basis(data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms) -> ComplexArray:
+    """Orthonormal basis of what residues, smooth terms and steps of the poles can follow, (n_lines, n)."""
+    columns = model_columns(data.s, fit.poles, terms, real_modes=data.real_modes, with_slopes=True)
+    columns = columns * np.tile(data.profile, 2)[:, None]
+    return unstacked(np.linalg.qr(columns / np.linalg.norm(columns, axis=0))[0])
+
+
+def _best_error(
+    data: WeightedLines, modelled: ComplexArray, basis: ComplexArray, waves: ComplexArray, of_force: IntArray
+) -> _Evidence:
+    """Find window and size of the highest evidence."""
+    weight = data.profile[:, None] * data.gain[of_force]
+    energy = np.sum(np.abs(modelled[:, of_force] * weight) ** 2, axis=0)
+    strongest = np.argsort(-energy)[:MOST_FRFS]
+    values = (modelled[:, of_force] * weight)[:, strongest]
+    misfit = ((data.receptance - modelled)[:, of_force] * weight)[:, strongest]
+    misfit = misfit - basis @ (basis.conj().T @ misfit).real
+    # a real coefficient and an imaginary one for each wave
+    products = waves.conj().T @ (np.sum(np.abs(values) ** 2, axis=1)[:, None] * waves)
+    gram = np.block([[products.real, -products.imag], [products.imag, products.real]])
+    sides = waves.conj().T @ np.sum(values.conj() * misfit, axis=1)
+    right = np.concatenate([sides.real, sides.imag])
+    for of_frf in values.T:
+        followed = (basis.conj() * of_frf[:, None]).T @ waves
+        followed_parts = np.concatenate([followed.real, -followed.imag], axis=1)
+        gram -= followed_parts.T @ followed_parts
+    best = _Evidence()
+    demanded = 2 * np.log(2 * misfit.size)  # of two numbers, by the BIC
+    for tail in (FINER * tail for tail in TAILS):
+        used = _part(tail)
+        part = np.concatenate([np.arange(used.start, used.stop), len(sides) + np.arange(used.start, used.stop)])
+        found = _evidence(gram[np.ix_(part, part)], right[part], tail)
+        if found.evidence > max(best.evidence, demanded):
+            best = found
+    return best
+
+
+def _evidence(gram: FloatArray, right: FloatArray, tail: int) -> _Evidence:
+    """Evidence of the best size, over that of none, and the coefficients expected with it."""
+    values, vectors = np.linalg.eigh(gram)
+    values = np.maximum(values, 0.0)
+    if not values[-1] > 0:
+        return _Evidence()
+    along = vectors.T @ right
+    variances = SIZES[:, None] / values[-1]
+    shrunk = variances / (1 + variances * values)
+    evidence = np.sum(along**2 * shrunk - np.log1p(variances * values), axis=1)
+    top = int(np.argmax(evidence))
+    expected = shrunk[top] * along
+    real, imag = np.split(vectors @ expected, 2)
+    return _Evidence(
+        evidence=float(evidence[top]),
+        coefficients=real + 1j * imag,
+        tail=tail,
+        variance=float(variances[top, 0]),
+        gain=float(np.sum(2 * along * expected - values * expected**2)),
+    )
