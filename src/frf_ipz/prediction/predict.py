@@ -197,8 +197,11 @@ def _magnitude_bands(
         centre = as_ensemble(updated, ensemble.lowest_rad_s)
         sizes = frf_sizes(updated, labels, s, centre) if error is not None and labels else None
         gains, powers = np.abs(updated.scale.gains(tuple(labels))), np.array([label.quantity.power for label in labels])
-        for lines, frfs, block in ensemble.receptances(*frf_rows(updated, labels), s):
-            values = block * s[lines, None] ** powers[frfs]
+        rows = frf_rows(updated, labels)
+        due = _due_spread(measured, updated, labels)
+        centres = centre.receptances(*rows, s)
+        for (lines, frfs, block), (_, _, middle) in zip(ensemble.receptances(*rows, s), centres, strict=True):
+            values = (middle + due[frfs] * (block - middle)) * s[lines, None] ** powers[frfs]
             if error is not None and sizes is not None:
                 errors = error.draw(len(values))[:, None, None]
                 values = values + errors * (error.ratio[lines, None] * sizes[lines, frfs])
@@ -206,3 +209,17 @@ def _magnitude_bands(
             values = values * gains[frfs] * np.stack(drawn, axis=1)[:, None]
             bands[:, lines, frfs] = np.quantile(np.abs(values), BAND, axis=0)
     return bands[0], bands[1]
+
+
+def _due_spread(measured: Measured, updated: UpdatedModel, labels: Sequence[FrfLabel]) -> FloatArray:
+    """Share of the ensemble's spread that is due in each FRF: the larger of those at its two ends."""
+    expansion = updated.expansion
+    if expansion is None:
+        return np.ones(len(labels))
+    outputs = {label.output_dof.unsigned for label in measured.connections}
+    inputs = {label.input_dof.unsigned for label in measured.connections}
+
+    def at(dof: AnyDof, known: set[AnyDof]) -> float:
+        return expansion.inner_spread if dof.unsigned in known else expansion.spread_at(dof)
+
+    return np.array([max(at(label.output_dof, outputs), at(label.input_dof, inputs)) for label in labels], float)

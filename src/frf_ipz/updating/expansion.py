@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from frf_ipz.arrays import FloatArray
+from frf_ipz.dofs import AnyDof, Dof
 
 MOST_NAMED = 4
 FEWEST = 5  # points among which one may stand out
@@ -68,6 +69,10 @@ class ShapeExpansion:
         Frequencies of measured modes, Hz, that follow one mode of the model: something hidden splits it.
     is_level_known : bool
         Whether the test knows its scale.
+    inner_nodes : tuple of int
+        Nodes between the measured points; all others lie beyond them.
+    inner_spread : float
+        Spread of the ensemble that is due there, over the whole of it, which is due beyond.
 
     Examples
     --------
@@ -89,6 +94,23 @@ class ShapeExpansion:
     masses: tuple[AttachedMass, ...]
     split: tuple[tuple[float, ...], ...]
     is_level_known: bool
+    inner_nodes: tuple[int, ...] = ()
+    inner_spread: float = 1.0
+
+    def spread_at(self, dof: AnyDof) -> float:
+        """Tell how much of the ensemble's spread is due at a point.
+
+        Parameters
+        ----------
+        dof : Dof or PortDof
+            The point.
+
+        Returns
+        -------
+        float
+            0 to 1; 1 beyond the measured points, and for a port, which has no place of its own.
+        """
+        return self.inner_spread if isinstance(dof, Dof) and dof.node in self.inner_nodes else 1.0
 
     @property
     def median_db(self) -> float:

@@ -19,6 +19,7 @@ from frf_ipz.rational import natural_frequency_hz
 from frf_ipz.updating.expansion import ShapeExpansion
 from frf_ipz.updating.scale import fit_scale
 from frf_ipz.updating.shape_expansion.attached_masses import attachment_places, find_attached_masses
+from frf_ipz.updating.shape_expansion.between_points import inner_points
 from frf_ipz.updating.shape_expansion.expanded_model import ExpandedModes, build_expanded_model, expand_modes
 from frf_ipz.updating.shape_expansion.left_out_points import (
     FEWEST,
@@ -90,8 +91,9 @@ def with_expanded_shapes(
     if fit.unknown_scale == "none" and abs(20 * np.log10(modes.gain)) > HALF * GAIN_MARGIN_DB:
         return updated  # a scale that is so far off where it is known is a mistake, which must show
     model, ensemble = build_expanded_model(
-        loaded.model, modes, count=options.ensemble, calibration=left_out.calibration, seed=options.seed
+        loaded.model, modes, count=options.ensemble, calibration=float(left_out.calibration.max()), seed=options.seed
     )
+    inner_nodes, inner_spread = inner_points(left_out, side_with_more(fit), loaded.model.expanded_dofs, geometry)
     expansion = ShapeExpansion(
         points=tuple(point.name for point in left_out.points),
         ratio=np.exp(left_out.log_ratio),
@@ -101,6 +103,8 @@ def with_expanded_shapes(
         masses=loaded.masses,
         split=_split_modes(modes),
         is_level_known=fit.unknown_scale == "none",
+        inner_nodes=inner_nodes,
+        inner_spread=inner_spread,
     )
     return replace(
         updated,

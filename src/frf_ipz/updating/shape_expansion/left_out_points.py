@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 LINES = 300  # of the band, at equal ratios
 FEWEST = 3  # points of a side: of two, one alone would tell the other's shape
 MOST = 12  # points left out, evenly over the side
-MEDIAN_SQUARE = 0.4549  # of a standard normal number
-COVERED = 0.9  # of the points: what is off at a point is so in all its modes, so that a point is one example
+COVERED, COVERED_SQUARE = 0.9, 2.7055  # share of the modes that a band is to hold; that quantile of a normal square
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,14 +37,14 @@ class LeftOutPoints:
         Median over lines and FRFs, after one factor a point where the scale of the test is unknown.
     log_ratio : (n_points,) array
         Logarithm of measured over predicted amplitude, the median over the modes.
-    calibration : float
-        Errors of the shapes over their stated standard deviations, so that it holds at 90 % of the points.
+    calibration : (n_points,) array
+        Errors of the shape there over their stated standard deviations, so that these hold 90 % of its modes.
     """
 
     points: tuple[AnyDof, ...]
     error_db: FloatArray
     log_ratio: FloatArray
-    calibration: float
+    calibration: FloatArray
 
 
 def side_with_more(fit: ModalFit) -> tuple[AnyDof, ...]:
@@ -95,12 +94,12 @@ def leave_points_out(fit: ModalFit, model: ReducedModel, *, error: float) -> Lef
     known = {point: judgement for point, judgement in judged.items() if judgement is not None}
     if not known:
         return None
-    squares = [float(np.median(judgement.squares)) / MEDIAN_SQUARE for judgement in known.values()]
+    squares = [np.quantile(judgement.squares, COVERED) / COVERED_SQUARE for judgement in known.values()]
     return LeftOutPoints(
         points=tuple(known),
         error_db=np.array([judgement.error_db for judgement in known.values()]),
         log_ratio=np.array([judgement.log_ratio for judgement in known.values()]),
-        calibration=float(np.sqrt(np.quantile(squares, COVERED, method="higher"))),
+        calibration=np.sqrt(squares),
     )
 
 

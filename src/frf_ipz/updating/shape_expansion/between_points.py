@@ -1,0 +1,100 @@
+"""Which points lie between measured ones, and which beyond all of them.
+
+Between measured points a shape is interpolated, beyond them it is extrapolated, and errors of the model grow. So points
+in the convex hull of the measured ones are judged by left-out points in the hull of the others, and all other points by
+those as well that lie at ends when they are left out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import nnls
+
+from frf_ipz.dofs import AnyDof, Dof
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.structure import Geometry
+    from frf_ipz.updating.shape_expansion.left_out_points import LeftOutPoints
+
+ROUNDING = 1e-6  # of the extent of the measured points: printed coordinates
+
+
+def lies_between(place: FloatArray, others: FloatArray) -> bool:
+    """Tell whether a point is in the convex hull of others.
+
+    Parameters
+    ----------
+    place : (3,) array
+        Coordinates, m.
+    others : (n, 3) array
+        Of the others.
+
+    Returns
+    -------
+    bool
+        False where there are none.
+
+    Examples
+    --------
+    >>> line = np.array([[0.1, 0, 0], [0.3, 0, 0], [0.5, 0, 0]])
+    >>> lies_between(np.array([0.4, 0, 0]), line), lies_between(np.array([0.6, 0, 0]), line)
+    (True, False)
+    """
+    if not len(others):
+        return False
+    extent = float(np.max(np.ptp(others, axis=0)))
+    if extent == 0.0:
+        return False
+    scaled = (others - place) / extent
+    # weights that add up to 1 and bring the others to the point
+    _, left_over = nnls(np.vstack([scaled.T, np.ones(len(others))]), np.array([0.0, 0.0, 0.0, 1.0]))
+    return bool(left_over < ROUNDING)
+
+
+def inner_points(
+    left_out: LeftOutPoints, measured: tuple[AnyDof, ...], dofs: Iterable[AnyDof], geometry: Geometry | None
+) -> tuple[tuple[int, ...], float]:
+    """Find the nodes between measured points, and by how much less errors of shapes exceed what is stated there.
+
+    Parameters
+    ----------
+    left_out : LeftOutPoints
+        How well measured points follow from the others.
+    measured : tuple of Dof or PortDof
+        All measured points of that side.
+    dofs : iterable of Dof or PortDof
+        DOFs of the model.
+    geometry : Geometry, optional
+        Where the nodes are.
+
+    Returns
+    -------
+    nodes : tuple of int
+        Nodes in the hull of the measured points; none where their places, or errors between them, are not known.
+    share : float
+        Largest calibration of an inner left-out point over the largest of all.
+    """
+    nowhere: tuple[int, ...] = ()
+    if geometry is None or geometry.is_schematic or not all(isinstance(dof, Dof) for dof in measured):
+        return nowhere, 1.0
+    numbers = np.asarray(geometry.nodes).tolist()
+    place_of = dict(zip(numbers, np.asarray(geometry.coordinates_m, float), strict=True))
+    nodes = {dof.node for dof in measured if isinstance(dof, Dof)}
+    if not nodes <= place_of.keys():
+        return nowhere, 1.0
+    is_inner = [
+        isinstance(point, Dof)
+        and lies_between(place_of[point.node], np.array([place_of[node] for node in nodes - {point.node}]))
+        for point in left_out.points
+    ]
+    if not any(is_inner):
+        return nowhere, 1.0
+    places = np.array([place_of[node] for node in sorted(nodes)])
+    candidates = sorted({dof.node for dof in dofs if isinstance(dof, Dof)} & place_of.keys())
+    inner = tuple(node for node in candidates if lies_between(place_of[node], places))
+    return inner, float(left_out.calibration[is_inner].max() / left_out.calibration.max())
