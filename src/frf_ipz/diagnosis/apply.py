@@ -13,7 +13,7 @@ from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.joint_change import build_together
 from frf_ipz.diagnosis.catalogue.model_context import ModelContext
 from frf_ipz.diagnosis.model.basis import make_basis
-from frf_ipz.diagnosis.model.change import NO_CHANGE, Change, with_change
+from frf_ipz.diagnosis.model.change import NO_CHANGE, Change, place_sensor, with_change
 from frf_ipz.diagnosis.model.layout import make_layout
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.result import Diagnosis
@@ -212,7 +212,5 @@ def _channel_names(label: FrfLabel) -> tuple[str, str]:
     return label.output_channel or f"output {label.output_dof}", label.input_channel or f"input {label.input_dof}"
 
 
-def _relabel(label: FrfLabel, moved: Mapping[str, int]) -> FrfLabel:
-    node = moved.get(_channel_names(label)[0])
-    dof = label.output_dof
-    return label if node is None or not isinstance(dof, Dof) else replace(label, output_dof=replace(dof, node=node))
+def _relabel(label: FrfLabel, moved: Mapping[str, int | Dof]) -> FrfLabel:
+    return replace(label, output_dof=place_sensor(label.output_dof, moved.get(_channel_names(label)[0])))

@@ -21,6 +21,8 @@ from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.measured.group_spectra import group_records
 from frf_ipz.diagnosis.measured.preprocessing.dc_offset import remove_dc_offset
+from frf_ipz.diagnosis.measured.preprocessing.hum import remove_hum
+from frf_ipz.diagnosis.measured.preprocessing.noise_levels import measure_noise_levels
 from frf_ipz.diagnosis.measured.preprocessing.residual_motion import remove_residual_motion
 from frf_ipz.diagnosis.nonlinear.laws.law import Law
 from frf_ipz.diagnosis.nonlinear.linearisation import linearise
@@ -413,10 +415,11 @@ def _make_linear_diagnosis(
 
 
 def _clean_and_assess(observations: Observations) -> tuple[Observations, Linearity | None]:
-    """Remove residual motion and offsets, and compare records of several levels.
+    """Remove hum, residual motion and offsets, and compare records of several levels.
 
     Offsets are read from what records of one linear system do not share, or, where they are of none, at rest.
     """
+    observations = measure_noise_levels(remove_hum(observations))
     linear = remove_residual_motion(observations)
     linearity = _assess_linearity(linear)
     if linearity is None or not linearity.is_nonlinear:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -81,6 +81,9 @@ class ObservedRecord(Concise):
         Time of its first sample in its recording, s.
     dc_offset_std : (n_sensors,) array, optional
         Standard deviation of offsets that may remain in the responses, SI; none where it is left out.
+    noise_levels : mapping of str to float, optional
+        Of channels, the noise power of this record over that of the mean of all records; not measured where it is left
+        out.
     """
 
     name: str
@@ -95,6 +98,7 @@ class ObservedRecord(Concise):
     number: int = 1
     start_s: float = 0.0
     dc_offset_std: FloatArray | None = None
+    noise_levels: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
         require_shape(f"the force of {self.name}", self.force, (None,))

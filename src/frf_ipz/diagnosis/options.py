@@ -43,6 +43,9 @@ class DiagnoseOptions:
         Half width of the relative deviation of each channel's gain, 1.
     position_tolerance_m_per_m : float
         Half width of the deviation of positions of sensors and excited points, m per m of the structure's extent.
+    angle_tolerance_deg : float
+        Half width of the deviation of the direction of each sensor and impact, degrees; of use where the model moves
+        in several directions.
     seed : int, optional
         Has no effect, since nothing is drawn at random; accepted, with a warning, for files of earlier versions.
 
@@ -65,6 +68,7 @@ class DiagnoseOptions:
     damping_tolerance: NotNegative = 0.3
     gain_tolerance: NotNegative = 5e-3
     position_tolerance_m_per_m: NotNegative = 1e-3
+    angle_tolerance_deg: NotNegative = 2.0
     seed: Seed | None = None
 
     def __post_init__(self) -> None:

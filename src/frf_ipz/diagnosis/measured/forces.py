@@ -10,7 +10,7 @@ from scipy.signal import periodogram
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.measured.noise import Noise, fit_noise
-from frf_ipz.diagnosis.measured.noise_growth import STEADY, NoiseGrowth, growth_of_levels
+from frf_ipz.diagnosis.measured.noise_growth import STEADY, MeasuredNoise, RecordNoise, growth_of_levels
 from frf_ipz.diagnosis.observations import ObservedRecord
 
 PULSE_PART = 3e-3  # of the peak: above, a sample belongs to the pulse
@@ -160,7 +160,7 @@ def _noise_std(quiet: FloatArray) -> float:
     return float(np.sqrt(np.median([block.mean() for block in squares])))
 
 
-def estimate_force_noise(records: tuple[ObservedRecord, ...], pulses: tuple[Pulse, ...]) -> tuple[Noise, NoiseGrowth]:
+def estimate_force_noise(records: tuple[ObservedRecord, ...], pulses: tuple[Pulse, ...]) -> tuple[Noise, RecordNoise]:
     """Estimate the noise of the force channel where nothing touches.
 
     Parameters
@@ -173,9 +173,9 @@ def estimate_force_noise(records: tuple[ObservedRecord, ...], pulses: tuple[Puls
     Returns
     -------
     noise : Noise
-        N^2 s, of a record with the reference's energy.
-    growth : NoiseGrowth
-        How it grows with the level.
+        N^2 s, of a record of relative power 1.
+    growth : RecordNoise
+        How much of it each record has.
     """
     frequencies: list[FloatArray] = []
     energies: list[FloatArray] = []
@@ -191,7 +191,9 @@ def estimate_force_noise(records: tuple[ObservedRecord, ...], pulses: tuple[Puls
         energies.append(density[inside] / 2)
     if not frequencies:
         return Noise(white=0.0), STEADY
-    growth = growth_of_levels(quiet_records, np.array([np.median(energy) for energy in energies]))
+    growth: RecordNoise = growth_of_levels(quiet_records, np.array([np.median(energy) for energy in energies]))
+    if MeasuredNoise.is_known(records):
+        growth = MeasuredNoise(channel=records[0].input_channel)
     frequency = np.concatenate(frequencies)
     scaled = zip(energies, growth.scales(quiet_records), strict=True)
     energy = np.concatenate([of_record / scale for of_record, scale in scaled])

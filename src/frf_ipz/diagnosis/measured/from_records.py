@@ -21,7 +21,13 @@ from frf_ipz.diagnosis.measured.forces import (
 )
 from frf_ipz.diagnosis.measured.group_spectra import GroupSpectra, group_records, transform_group
 from frf_ipz.diagnosis.measured.noise import Noise, fit_force_noise, fit_noise
-from frf_ipz.diagnosis.measured.noise_growth import STEADY, NoiseGrowth, fit_growth
+from frf_ipz.diagnosis.measured.noise_growth import (
+    STEADY,
+    MeasuredNoise,
+    RecordNoise,
+    find_unexplained_share,
+    fit_growth,
+)
 from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
 from frf_ipz.diagnosis.observations import Observations, ObservedRecord, transform_records
 from frf_ipz.frf import FrfLabel
@@ -51,9 +57,9 @@ class RecordSurvey:
         Of the force channel.
     responses : dict of str to Noise
         Of each output channel, in the mean of its records.
-    force_growth : NoiseGrowth
-        How much more of it strong records have than weak ones.
-    response_growth : dict of str to NoiseGrowth
+    force_growth : RecordNoise
+        How much of it each record has.
+    response_growth : dict of str to RecordNoise
         The same of each output channel.
     resonances : Resonances
         Peaks of all FRFs.
@@ -65,8 +71,8 @@ class RecordSurvey:
     pulses: tuple[tuple[Pulse, ...], ...]
     force: Noise
     responses: dict[str, Noise]
-    force_growth: NoiseGrowth
-    response_growth: dict[str, NoiseGrowth]
+    force_growth: RecordNoise
+    response_growth: dict[str, RecordNoise]
     resonances: Resonances
     least_decay_1_s: float
 
@@ -182,9 +188,9 @@ def _response_noise(
     whole: tuple[tuple[Pulse, ...], ...],
     pulses: tuple[tuple[Pulse, ...], ...],
     group_spectra: list[GroupSpectra],
-    force_noise: tuple[Noise, NoiseGrowth],
+    force_noise: tuple[Noise, RecordNoise],
     truncation: list[FloatArray],
-) -> tuple[dict[str, Noise], dict[str, NoiseGrowth]]:
+) -> tuple[dict[str, Noise], dict[str, RecordNoise]]:
     """Estimate the noise of each output channel, and its growth, from what repeated records do not share."""
     noise, growths = {}, {}
     of_force, force_growth = force_noise
@@ -197,16 +203,16 @@ def _response_noise(
             for index, group in enumerate(groups)
             if channel in [sensor.channel for sensor in group[0].sensors] and len(group) > 1
         ]
-        growth = growths[channel] = fit_growth(
-            [(groups[index], group_spectra[index], sensor) for index, sensor in having]
-        )
+        parts = [(groups[index], group_spectra[index], sensor) for index, sensor in having]
+        is_known = MeasuredNoise.is_known(record for group, _, _ in parts for record in group)
+        growth = growths[channel] = MeasuredNoise(channel=channel) if is_known else fit_growth(parts)
         for index, sensor in having:
             group, lines = groups[index], group_spectra[index]
             gates = np.array([gate_variance(lines.s, pulse) for pulse in pulses[index]])
             gate_s = np.mean(force_growth.scales(group)[:, None] * gates, axis=0)
             known = np.abs(lines.values[:, sensor]) ** 2 * of_force.density(lines.frequency_hz) * gate_s
             known += truncation[index][:, sensor]
-            share = growth.unexplained_share(group, lines)
+            share = find_unexplained_share(growth, group, lines)
             energy = lines.unexplained[:, sensor]
             stacks.append((lines.frequency_hz, energy, share * _noise_gain(group, lines), known))
         if stacks:

@@ -1,6 +1,7 @@
-"""Noise that grows with the level of a record, as that of recorders does which choose their range.
+"""Noise that differs from record to record, as that of recorders does which choose their range.
 
-The noise power of a record is taken for a power of the energy of its force: the exponent is 0 for noise of one power,
+Where the ends of records show it, it is read there, see `preprocessing.noise_levels`. Elsewhere it is taken to grow:
+the noise power of a record is a power of the energy of its force: the exponent is 0 for noise of one power,
 and 1 for noise in proportion to the level. What the FRF of all records leaves of record k, whose share of the force's
 power on a line is h_k, has the expectation ``v (s_k (1 - 2 h_k) + h_k sum h_m s_m)`` for relative noise powers s; the
 exponent is the one that makes all of these misfits the most likely, with a v of its own for each line.
@@ -9,7 +10,7 @@ exponent is the one that makes all of these misfits the most likely, with a v of
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -17,12 +18,62 @@ from scipy.optimize import minimize_scalar
 from frf_ipz.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from frf_ipz.diagnosis.measured.group_spectra import GroupSpectra
     from frf_ipz.diagnosis.observations import ObservedRecord
 
 LEAST_RECORDS = 3  # two records have the same misfit, whichever is the noisy one
+
+
+class RecordNoise(Protocol):
+    """Noise power of records of one channel over that of a reference."""
+
+    def scales(self, group: Sequence[ObservedRecord]) -> FloatArray:
+        """Give the relative noise power of records, (n_records,) array."""
+        ...
+
+
+def find_unexplained_share(noise: RecordNoise, group: Sequence[ObservedRecord], lines: GroupSpectra) -> FloatArray:
+    """Give what the FRF of all records leaves of their noise, over that of the reference.
+
+    Parameters
+    ----------
+    noise : RecordNoise
+        Of the records.
+    group : sequence of ObservedRecord
+        The records.
+    lines : GroupSpectra
+        Their transforms.
+
+    Returns
+    -------
+    (n_lines,) array
+        Expectation of `GroupSpectra.unexplained`; 1 for steady noise.
+    """
+    return np.asarray((1 - shares_of(lines)) @ noise.scales(group) / (len(group) - 1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredNoise:
+    """Noise power of records that was measured in each.
+
+    Parameters
+    ----------
+    channel : str
+        Column of the recordings.
+    """
+
+    channel: str
+
+    def scales(self, group: Sequence[ObservedRecord]) -> FloatArray:
+        """Give the relative noise power of records, (n_records,) array: 1 for the mean of all."""
+        return np.array([(record.noise_levels or {}).get(self.channel, 1.0) for record in group])
+
+    @staticmethod
+    def is_known(records: Iterable[ObservedRecord]) -> bool:
+        """Whether it was measured in all records."""
+        return all(record.noise_levels is not None for record in records)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,23 +105,6 @@ class NoiseGrowth:
             1 for one with the energy of the reference.
         """
         return np.asarray((force_energies(group) / self.energy) ** self.exponent)
-
-    def unexplained_share(self, group: Sequence[ObservedRecord], lines: GroupSpectra) -> FloatArray:
-        """Give what the FRF of all records leaves of their noise, over that of the reference.
-
-        Parameters
-        ----------
-        group : sequence of ObservedRecord
-            The records.
-        lines : GroupSpectra
-            Their transforms.
-
-        Returns
-        -------
-        (n_lines,) array
-            Expectation of `GroupSpectra.unexplained`; 1 for steady noise.
-        """
-        return np.asarray((1 - shares_of(lines)) @ self.scales(group) / (len(group) - 1))
 
 
 STEADY = NoiseGrowth(exponent=0.0)

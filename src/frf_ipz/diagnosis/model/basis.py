@@ -17,6 +17,7 @@ from scipy import linalg, sparse
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.model.motion import stack_motions
+from frf_ipz.dofs import Dof
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import ModalBasis, solve_basis
 from frf_ipz.numerics.factorization import DENSE_ORDER
@@ -178,7 +179,8 @@ def enrich_basis(basis: Basis, change: Change) -> Basis:
                 loads.append(multiply(matrix, _deflections(basis, first)))
     loads += [attachment.motions for attachment in change.attachments]
     if change.moved:
-        loads.append(_unit_loads(basis, tuple(change.moved.values())))
+        places = change.moved.values()
+        loads.append(_unit_loads(basis, tuple(place.node if isinstance(place, Dof) else place for place in places)))
     if not loads:
         return basis
     shapes.append(_deflections(basis, np.hstack(loads)))

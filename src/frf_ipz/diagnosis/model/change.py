@@ -13,7 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import AnyDof, Dof
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import Matrix
@@ -73,8 +73,8 @@ class Change:
         The stiffness of each mode is the model's at the mode's own frequency instead, and rises from there.
     channels : mapping of str to Transfer
         What a channel shows over what it should show.
-    moved : mapping of str to int
-        Output channels, and the node where the sensor really is.
+    moved : mapping of str to (int or Dof)
+        Output channels, and the node where the sensor really is, or the DOF where its direction is another one too.
 
     Examples
     --------
@@ -100,7 +100,7 @@ class Change:
     reference_rad_s: float = 0.0
     keeps_modes: bool = False
     channels: Mapping[str, Transfer] = field(default_factory=dict)
-    moved: Mapping[str, int] = field(default_factory=dict)
+    moved: Mapping[str, int | Dof] = field(default_factory=dict)
 
     def __add__(self, second: Change) -> Change:
         """Put two effects together."""
@@ -119,6 +119,28 @@ class Change:
             channels=_product(self.channels, second.channels),
             moved={**self.moved, **second.moved},
         )
+
+
+def place_sensor(dof: AnyDof, where: int | Dof | None) -> AnyDof:
+    """Give the DOF that a sensor really shows.
+
+    Parameters
+    ----------
+    dof : Dof or PortDof
+        As the test says; a port stays where it is.
+    where : int, Dof or None
+        Where it really is, as in `Change.moved`; None where it is not moved.
+
+    Returns
+    -------
+    Dof or PortDof
+        With the sign of the sensor.
+    """
+    if where is None or not isinstance(dof, Dof):
+        return dof
+    if isinstance(where, Dof):
+        return replace(dof, node=where.node, direction=where.direction)
+    return replace(dof, node=where)
 
 
 def _sum(first: Matrix | None, second: Matrix | None) -> Matrix | None:

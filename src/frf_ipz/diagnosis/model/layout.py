@@ -162,6 +162,28 @@ def make_shift_rows(model: StructuralModel, dof: AnyDof) -> dict[str, FloatArray
     return {axis: dof.sign * _shift_row(model, dof, axis) for axis in axes}
 
 
+def make_turn_rows(model: StructuralModel, dof: AnyDof) -> dict[str, FloatArray]:
+    """How the motion at a DOF changes with its direction.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The model.
+    dof : Dof or PortDof
+        Of a sensor or an excited point.
+
+    Returns
+    -------
+    dict of str to (n_all,) array
+        For each direction towards which it may be turned, weights of all DOFs in the derivative, 1/rad; none where the
+        node moves in one direction only.
+    """
+    if not isinstance(dof, Dof) or dof.direction not in AXES:
+        return {}  # the direction of a port is defined by its weights
+    others = [axis for axis in AXES if axis != dof.direction and Dof(dof.node, axis) in model.full_indices]
+    return {axis: make_motion_row(model, Dof(dof.node, axis)) for axis in others}
+
+
 def shear_slope_at_force(model: StructuralModel, dof: AnyDof) -> float:
     """How fast the motion falls on both sides of a force, by local shear.
 

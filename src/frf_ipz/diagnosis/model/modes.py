@@ -6,7 +6,7 @@ scatter then acts on those modes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,8 +14,8 @@ from scipy import linalg
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.model.basis import solve_changed_modes
+from frf_ipz.diagnosis.model.change import place_sensor
 from frf_ipz.diagnosis.model.nuisance import make_all_shift_rows
-from frf_ipz.dofs import Dof
 from frf_ipz.fe.eigen import mode_damping_ratios
 from frf_ipz.numerics.pencils import generalised_eigh
 
@@ -186,10 +186,7 @@ def make_motion_rows(basis: Basis, layout: Layout, change: Change, nuisance_prio
     MotionRows
         Sensors where the change says they are.
     """
-    outputs = tuple(
-        replace(dof, node=change.moved.get(channel, dof.node)) if isinstance(dof, Dof) else dof
-        for channel, dof in layout.outputs
-    )
+    outputs = tuple(place_sensor(dof, change.moved.get(channel)) for channel, dof in layout.outputs)
     return MotionRows(
         outputs=np.asarray(basis.model.full_rows(outputs) @ basis.vectors),
         inputs=np.asarray(basis.model.full_rows(layout.inputs) @ basis.vectors),

@@ -2,11 +2,11 @@
 
 Small errors of mass and stiffness, wherever they are, act on the modes of the band as symmetric matrices: stiffness
 ``omega_i omega_j kappa_ij`` and mass ``mu_ij``. Their diagonals are the scatter of the frequencies, the rest that of
-the shapes, and with it of the zeros. Damping ratios of modes, positions of sensors and excited points, and gains of
-channels come beside. A tolerance is the half width of what can be, so that the standard deviation is the tolerance over
-the square root of three. Nothing that is stated by a tolerance lies far outside of it: there the prior rises much
-faster than a normal one. Shapes of modes, and all about modes beyond the band, are stated by no tolerance and keep a
-normal prior.
+the shapes, and with it of the zeros. Damping ratios of modes, positions and directions of sensors and excited points,
+and gains of channels come beside. A tolerance is the half width of what can be, so that the standard deviation is the
+tolerance over the square root of three. Nothing that is stated by a tolerance lies far outside of it: there the prior
+rises much faster than a normal one. Shapes of modes, and all about modes beyond the band, are stated by no tolerance
+and keep a normal prior.
 
 Near an excited point FRFs contain the local compliance around the contact, which depends on its size and which no mesh
 represents well: the compliance of all modes beyond those with scatter is not known exactly.
@@ -28,7 +28,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
-from frf_ipz.diagnosis.model.layout import make_motion_row, make_shift_rows, measure_extents, shear_slope_at_force
+from frf_ipz.diagnosis.model.layout import (
+    AXES,
+    make_motion_row,
+    make_shift_rows,
+    make_turn_rows,
+    measure_extents,
+    shear_slope_at_force,
+)
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beam_models import with_formulation
 from frf_ipz.fe.eigen import solve_basis
@@ -54,6 +61,7 @@ MAX_GAIN = 2.0  # logarithm: no step on the way to a fit goes farther
 EDGE = 2.0  # standard deviations, a little more than a tolerance: beyond, its prior rises faster
 STEEPNESS = 1.0  # per standard deviation: how much faster
 MAX_BEYOND_EDGE = 4.0  # standard deviations beyond the edge: from there on no faster, or fits would not get back
+TURNED = "turned to "  # before an axis: a direction that is not exact, beside a position that is not
 UNSTATED_SPREAD = 0.5  # of a damping ratio that is not stated: on its suspension, or far beyond the band
 
 
@@ -70,7 +78,7 @@ class NuisanceValues:
     suspension : (n_rigid,) array
         Squared frequencies of rigid-body modes, (rad/s)^2.
     output_shift, input_shift : (n, n_axes) array
-        Distances of sensors and excited points from their nominal positions, m.
+        Distances of sensors and excited points from their nominal positions, m, and angles to their directions, rad.
     local : (n_frfs,) array
         Errors of the compliance that modes beyond those with scatter give to the FRFs, m/N.
     gains : (n_channels,) array
@@ -100,7 +108,8 @@ class NuisanceBlocks:
     suspension : slice
         Squared frequencies of rigid-body modes.
     output_shifts, input_shifts : slice
-        Distances of sensors and excited points from their nominal positions; of each, along one axis after the other.
+        Distances of sensors and excited points from their nominal positions and angles to their directions; of each,
+        along one axis after the other.
     local : slice
         Errors of the local compliance of the FRFs.
     gains : slice
@@ -138,9 +147,9 @@ class NuisancePrior:
     suspension_std : float
         Of squared frequencies of rigid-body modes, (rad/s)^2.
     axes : tuple of str
-        Along which positions are uncertain.
+        Along which positions are uncertain, and, after `TURNED`, towards which directions are.
     shift_std : (n_axes,) array
-        m.
+        m, and rad.
     n_outputs, n_inputs : int
         Sensor positions and excited points.
     local_std : (n_frfs,) array
@@ -355,6 +364,8 @@ def make_nuisance_prior(basis: Basis, layout: Layout, options: DiagnoseOptions) 
     directions = {dof.direction for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)}
     axes = tuple(axis for axis in span if directions != {axis})
     shift_std = np.array([options.position_tolerance_m_per_m * span[axis] * UNIFORM_STD for axis in axes])
+    turned = _list_turns(basis, layout)
+    turn_std = np.full(len(turned), np.deg2rad(options.angle_tolerance_deg) * UNIFORM_STD)
     beyond_scatter = LOCAL_PART * _local_compliance(basis, layout, n_modes)
     return NuisancePrior(
         n_modes=n_modes,
@@ -363,8 +374,8 @@ def make_nuisance_prior(basis: Basis, layout: Layout, options: DiagnoseOptions) 
         mu_std=mu,
         damping_std=_damping_std(options.damping_tolerance * UNIFORM_STD, growth, n_rigid),
         suspension_std=(SUSPENSION_FREQUENCY * first) ** 2,
-        axes=axes,
-        shift_std=shift_std,
+        axes=(*axes, *turned),
+        shift_std=np.concatenate([shift_std, turn_std]),
         n_outputs=len(layout.outputs),
         n_inputs=len(layout.inputs),
         local_std=np.copysign(np.hypot(beyond_scatter, _corner_compliance(basis, layout, shift_std)), beyond_scatter),
@@ -372,6 +383,12 @@ def make_nuisance_prior(basis: Basis, layout: Layout, options: DiagnoseOptions) 
         gain_std=options.gain_tolerance * UNIFORM_STD,
         is_stated=(np.arange(n_modes) >= n_rigid) & (beyond == 0),
     )
+
+
+def _list_turns(basis: Basis, layout: Layout) -> tuple[str, ...]:
+    """List the directions towards which sensors or impacts may be turned."""
+    towards = {axis for dof in layout.dofs for axis in make_turn_rows(basis.model, dof)}
+    return tuple(TURNED + axis for axis in AXES if axis in towards)
 
 
 def _count_lowered_modes(basis: Basis) -> int:
@@ -414,25 +431,26 @@ def _are_at_one_node(output: AnyDof, force: AnyDof) -> bool:
 
 
 def make_all_shift_rows(basis: Basis, nuisance_prior: NuisancePrior, dofs: tuple[AnyDof, ...]) -> FloatArray:
-    """Make the rows in the basis by which motions change with positions.
+    """Make the rows in the basis by which motions change with positions and directions.
 
     Parameters
     ----------
     basis : Basis
         Coordinates.
     nuisance_prior : NuisancePrior
-        Says along which axes positions are uncertain.
+        Says along which axes positions are uncertain, and towards which directions are.
     dofs : tuple of Dof
         Of sensors or excited points.
 
     Returns
     -------
     (n_dofs, n_axes, q) array
-        1/m.
+        1/m, and 1/rad.
     """
     rows = np.zeros((len(dofs), len(nuisance_prior.axes), basis.vectors.shape[1]))
     for index, dof in enumerate(dofs):
-        for axis, row in make_shift_rows(basis.model, dof).items():
+        turned = {TURNED + axis: row for axis, row in make_turn_rows(basis.model, dof).items()}
+        for axis, row in {**make_shift_rows(basis.model, dof), **turned}.items():
             if axis in nuisance_prior.axes:
                 weighted = np.flatnonzero(row)
                 rows[index, nuisance_prior.axes.index(axis)] = row[weighted] @ basis.vectors[weighted]

@@ -20,6 +20,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.measured.forces import MISSING_SAMPLES, isolate_pulse, missing_ringing
 from frf_ipz.diagnosis.measured.group_spectra import group_records
+from frf_ipz.diagnosis.measured.noise_growth import MeasuredNoise
 from frf_ipz.diagnosis.nonlinear.channel_noise import ChannelNoise, read_noise
 from frf_ipz.numerics.least_squares import solve_scaled_columns
 
@@ -111,10 +112,12 @@ def _assess_group(
             for record in records
         ]
     )
-    of_force = noise.force_energy(frequency[used], n * step) + missing[:, :1]
+    by_force = MeasuredNoise(channel=records[0].input_channel).scales(records)[:, None]
+    of_force = noise.force_energy(frequency[used], n * step) * by_force + missing[:, :1]
     for row, sensor in enumerate(records[0].sensors):
         column = noise.sensors.index((sensor.channel, sensor.dof))
-        of_response = noise.response_energy(column, frequency[used], length) + missing[:, [1 + row]]
+        by_record = MeasuredNoise(channel=sensor.channel).scales(records)[:, None]
+        of_response = noise.response_energy(column, frequency[used], length) * by_record + missing[:, [1 + row]]
         of_response = of_response + _residual_motion_energy(records, row, frequency[used], sigma)
         energies = np.array([of_force, of_response])
         for group in range(n_groups):

@@ -24,6 +24,7 @@ from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel
 from frf_ipz.quantities import FrfQuantity
+from frf_ipz.structure import StructuralModel
 
 BAND_HZ = (10.0, 700.0)
 MIDDLE = 2 * np.pi * np.sqrt(BAND_HZ[0] * BAND_HZ[1])
@@ -369,3 +370,37 @@ def test_derivatives_by_nuisance_parameters(tmp_path):
         difference = (hypothesis.respond(np.zeros(0), moved, S).values - here.values) / STEP
         scale = np.abs(jacobian[:, :, index]).max() + 1e-6 * np.abs(here.values).max()  # rounding of the difference
         assert np.abs(difference - jacobian[:, :, index]).max() < DIFFERENCE * scale
+
+
+def spatial_model():
+    """A mass on three springs that are not alike, beside another one: each node moves in two directions."""
+    rows = [[3.0, 0.5, -1.0, 0.0], [0.5, 2.0, 0.0, -0.5], [-1.0, 0.0, 4.0, 0.3], [0.0, -0.5, 0.3, 2.5]]
+    stiffness = 1e5 * np.array(rows)
+    dofs = ["1:x", "1:z", "2:x", "2:z"]
+    places = {1: (0.0, 0.0, 0.0), 2: (1.0, 0.0, 0.5)}
+    masses = np.diag([2.0, 2.0, 1.0, 1.0])
+    return StructuralModel.from_matrices(masses, stiffness, dofs=dofs, coordinates=places, modal_damping=0.01)
+
+
+def test_a_sensor_may_show_another_axis_of_its_node():
+    names = [FrfLabel(parse_dof(dof), Dof(2, "x"), FrfQuantity.ACCELERANCE, dof[-1]) for dof in ("1:-x", "1:+z")]
+    turned = [replace(names[0], output_dof=parse_dof("1:-z")), names[1]]
+    model = spatial_model()
+    expected = compute_frfs(model, turned, S)
+    location = Location(channels=("x",), nodes=(1,), directions=("z",))
+    assert_same(changed_frfs(model, "sensor_misplaced", location, [], names), expected, REDUCED)
+
+
+def test_a_direction_that_is_not_exact_shows_some_of_the_other_axes():
+    """The derivative by the angle of a sensor is the motion across it."""
+    names = [FrfLabel(Dof(1, "x"), Dof(2, "x"), FrfQuantity.ACCELERANCE, "a")]
+    model = spatial_model()
+    context = context_of(model, names)
+    nuisance_prior = make_nuisance_prior(context.basis, context.layout, DiagnoseOptions(angle_tolerance_deg=3.0))
+    hypothesis = make_hypothesis(context, nuisance_prior, ())
+    values = np.zeros(nuisance_prior.size)
+    towards_z = nuisance_prior.blocks.output_shifts.start + nuisance_prior.axes.index("turned to z")
+    values[towards_z] = 1.0
+    changed = hypothesis.respond(np.zeros(0), values, S).values - hypothesis.respond(np.zeros(0), 0 * values, S).values
+    across = compute_frfs(model, [replace(names[0], output_dof=Dof(1, "z"))], S)
+    assert_same(changed, np.deg2rad(3.0) / np.sqrt(3) * across, REDUCED)

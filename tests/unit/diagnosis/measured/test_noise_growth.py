@@ -5,7 +5,7 @@ import pytest
 
 import frf_ipz
 from frf_ipz.diagnosis.measured.group_spectra import group_records, transform_group
-from frf_ipz.diagnosis.measured.noise_growth import STEADY, fit_growth
+from frf_ipz.diagnosis.measured.noise_growth import STEADY, find_unexplained_share, fit_growth
 from frf_ipz.diagnosis.observations import observe
 from small_campaign import MODEL, RATE, SAMPLES, START, TEST, YOUNG, accelerance, write_csv
 
@@ -42,7 +42,7 @@ def test_the_growth_is_read_from_the_records(tmp_path, grows, exponent):
     growth = fit_growth([(group, lines, 0)])
     assert growth.exponent == pytest.approx(exponent, abs=0.05)
     np.testing.assert_allclose(STEADY.scales(group), 1.0, rtol=0)
-    np.testing.assert_allclose(STEADY.unexplained_share(group, lines), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(find_unexplained_share(STEADY, group, lines), 1.0, rtol=1e-12)
     assert fit_growth([(group[:2], lines, 0)]) is STEADY
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from frf_ipz.arrays import FloatArray
-from frf_ipz.dofs import Dof
+from frf_ipz.diagnosis.model.change import place_sensor
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.change import Change
@@ -63,6 +63,4 @@ def _filter_inversely(record: ObservedRecord, values: FloatArray, channel: str, 
 
 
 def _sensor_at_true_node(sensor: Sensor, change: Change) -> Sensor:
-    node = change.moved.get(sensor.channel)
-    dof = sensor.dof
-    return sensor if node is None or not isinstance(dof, Dof) else replace(sensor, dof=replace(dof, node=node))
+    return replace(sensor, dof=place_sensor(sensor.dof, change.moved.get(sensor.channel)))
