@@ -156,6 +156,22 @@ def verdicts(
     print(summarise_verdicts(table).to_string(index=False))
 
 
+@app.command()
+def machines(
+    folder: Annotated[Path, typer.Argument(help="Where machines and results are kept.")],
+    first_seed: Annotated[int, typer.Option("--first-seed", help="Of the first machine.")] = 171_000_000,
+    count: Annotated[int, typer.Option("--count", metavar="N", help="Machines; every third one is sound.")] = 60,
+    jobs: Annotated[int, typer.Option("--jobs", help="Machines at the same time.")] = 1,
+) -> None:
+    """Prove the diagnosis on three-dimensional machines: make, seal, diagnose, open, score."""
+    from frf_testbench.machines.prove import prove_machines, summarise_machines
+
+    table = prove_machines(folder, first_seed=first_seed, count=count, jobs=jobs)
+    table.to_csv(folder / "scores.csv", index=False)
+    print(table.to_string(index=False, float_format="{:.4g}".format))
+    print(summarise_machines(table).to_string(index=False))
+
+
 @contextmanager
 def _progress_bar() -> Iterator[Progress]:
     """Show how far the work is, where there is a terminal."""

@@ -183,14 +183,15 @@ class Whitening:
 
 
 def _whiten_separately(factors: ComplexArray, errors: ComplexArray) -> FloatArray:
-    """Whiten each FRF by itself, (n_frfs, 2 n_points, n) array."""
+    """Whiten each FRF by itself, (n_frfs, 2 n_points, n) array; what leaves an FRF as it is costs nothing there."""
     columns = errors.reshape(*errors.shape[:2], -1)
     n_points, n_frfs, n = columns.shape
-    white = np.empty((n_frfs, 2 * n_points, n))
+    white = np.zeros((n_frfs, 2 * n_points, n))
     for frf, factor in enumerate(factors):
-        raw = np.sqrt(2.0) * columns[:, frf]
+        changed = np.flatnonzero(columns[:, frf].any(axis=0))
+        raw = np.sqrt(2.0) * columns[:, frf, changed]
         part = blas.ztrmm(1.0, factor.T, raw, lower=0, trans_a=1) if n > 1 else factor @ raw  # half the work, for many
-        white[frf, :n_points], white[frf, n_points:] = part.real, part.imag
+        white[frf, :n_points, changed], white[frf, n_points:, changed] = part.real.T, part.imag.T
     return white
 
 
