@@ -192,7 +192,8 @@ def _response_noise(
     truncation: list[FloatArray],
 ) -> tuple[dict[str, Noise], dict[str, RecordNoise]]:
     """Estimate the noise of each output channel, and its growth, from what repeated records do not share."""
-    noise, growths = {}, {}
+    noise: dict[str, Noise] = {}
+    growths: dict[str, RecordNoise] = {}
     of_force, force_growth = force_noise
     groups = _records_of(pulses)
     channels = dict.fromkeys(sensor.channel for group in groups for sensor in group[0].sensors)

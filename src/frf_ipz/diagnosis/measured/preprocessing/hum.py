@@ -55,7 +55,8 @@ class _End:
         signals = signals - signals.mean(1, keepdims=True)
         n = signals.shape[1]
         energy = np.abs(np.fft.rfft(signals * np.hanning(n), PADDING * n)) ** 2
-        return cls(time_s=record.step_s * np.arange(start, record.n_samples), signals=signals, energy=energy)
+        time = np.asarray(record.step_s * np.arange(start, record.n_samples))
+        return cls(time_s=time, signals=signals, energy=np.asarray(energy))
 
     @property
     def line_hz(self) -> float:
@@ -65,7 +66,7 @@ class _End:
     @property
     def highest_hz(self) -> float:
         """Highest tone whose wandering the lines hold."""
-        return self.line_hz * (self.energy.shape[1] - 1) / (1 + WANDER)
+        return float(self.line_hz * (self.energy.shape[1] - 1) / (1 + WANDER))
 
     def over_floor(self, frequency_hz: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Energy over that of the noise beside, (n_frequencies, n_channels), and that of the noise, (n_channels,)."""
@@ -169,10 +170,10 @@ def _refine(end: _End, mains_hz: float, orders: IntArray, weights: FloatArray, s
     shown = weights.any(axis=1)
 
     def faintness(hz: float) -> float:
-        return -float(np.sum(np.abs(end.amplitudes(hz * orders[shown])) ** 2 * weights[shown].T))
+        return -float(np.sum(np.abs(end.amplitudes(np.asarray(hz * orders[shown]))) ** 2 * weights[shown].T))
 
-    bounds, exact = (mains_hz - 2 * step_hz, mains_hz + 2 * step_hz), {"xatol": 1e-4 * step_hz}
-    return float(minimize_scalar(faintness, bounds=bounds, method="bounded", options=exact).x)
+    low, high, exact = mains_hz - 2 * step_hz, mains_hz + 2 * step_hz, 1e-4 * step_hz
+    return float(minimize_scalar(faintness, bounds=(low, high), method="bounded", options={"xatol": exact}).x)
 
 
 def _is_steady(ends: Sequence[_End], mains_hz: FloatArray, orders: IntArray) -> BoolArray:
@@ -181,12 +182,12 @@ def _is_steady(ends: Sequence[_End], mains_hz: FloatArray, orders: IntArray) -> 
     for end, hz in zip(ends, mains_hz.tolist(), strict=True):
         middle = len(end.time_s) // 2
         for row, part in enumerate((slice(None, middle), slice(middle, None))):
-            energy[row] += np.abs(end.amplitudes(hz * orders, part)) ** 2
+            energy[row] += np.abs(end.amplitudes(np.asarray(hz * orders), part)) ** 2
     return np.asarray(energy[1] > STEADY * energy[0]).T
 
 
 def _subtract(record: ObservedRecord, end: _End, hum: _Hum, mains_hz: float) -> ObservedRecord:
-    frequency = mains_hz * hum.orders
+    frequency = np.asarray(mains_hz * hum.orders)
     amplitudes = end.amplitudes(frequency) * hum.shows.T
     turning = np.exp(2j * np.pi * np.outer(frequency, record.step_s * np.arange(record.n_samples)))
     tones = (amplitudes @ turning).real
