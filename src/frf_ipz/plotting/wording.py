@@ -103,6 +103,8 @@ def with_error(value: float, std: float, digits: int = 6) -> str:
     --------
     >>> with_error(16.08312, 0.0041)
     '16.083 ± 0.004'
+    >>> with_error(-0.01, 0.2), with_error(111.99432, 3.1e-4, 7)
+    ('0.0 ± 0.2', '111.9943 ± 0.0003')
     """
     if not (math.isfinite(std) and std > 0 and math.isfinite(value)):
         return number(value, digits)
@@ -112,7 +114,8 @@ def with_error(value: float, std: float, digits: int = 6) -> str:
         return f"{number(value, max(size - math.floor(math.log10(std)), 0) + 2)} ± {number(std, 1)}"
     if decimals + size >= digits + 4 or decimals > digits + 3:
         return f"{number(value, digits)} ± {number(std, 1)}"
-    return f"{value:.{decimals}f} ± {number(std, 1)}"
+    rounded = round(value, decimals) + 0.0  # no minus before a zero
+    return f"{rounded:.{decimals}f} ± {std:.{decimals}f}"
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:

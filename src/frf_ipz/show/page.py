@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from frf_ipz.errors import InputError
 from frf_ipz.report.html import page_environment
 from frf_ipz.report.page import SECTIONS, run_values
-from frf_ipz.report.section import Block, Figure, Section
+from frf_ipz.report.section import Block, Choice, Figure, Section
 from frf_ipz.report.sections import shapes
 from frf_ipz.show.controls import (
     Choices,
@@ -182,10 +182,15 @@ def _with_ghost(section: Section, run: Results, ghost: Ghost | None) -> Section:
     prediction = run.prediction
     if ghost is None or prediction is None:
         return section
-    blocks = [
-        replace(block, picture=ghost.behind(block.picture, prediction)) if isinstance(block, Figure) else block
-        for block in section.blocks
-    ]
+    blocks: list[Block] = []
+    for block in section.blocks:
+        if isinstance(block, Figure):
+            blocks.append(replace(block, picture=ghost.behind(block.picture, prediction)))
+        elif isinstance(block, Choice):
+            pictures = {name: ghost.behind(picture, prediction) for name, picture in block.pictures.items()}
+            blocks.append(replace(block, pictures=pictures))
+        else:
+            blocks.append(block)
     return replace(section, blocks=tuple(blocks))
 
 

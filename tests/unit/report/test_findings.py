@@ -138,7 +138,7 @@ def test_numbers_of_a_few_digits_are_written_out(run):
 def test_findings_come_before_alternatives(run):
     findings = table(run, "Findings and alternatives")
     assert [row[0] for row in findings.rows] == ["added mass", "sensor gain", "local stiffness"]
-    assert "mass_kg = 0.0123 ± 4e-4" in findings.rows[0]
+    assert "mass_kg = 0.0123 ± 0.0004" in findings.rows[0]
 
 
 def test_proof_on_held_out_data_is_in_percent(run):

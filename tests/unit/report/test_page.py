@@ -14,8 +14,10 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from frf_ipz.dofs import Dof
 from frf_ipz.report.html import REPORT, SCRIPTS
 from frf_ipz.report.page import SECTIONS, page_margins, write_report
+from frf_ipz.report.sections import prediction
 from frf_ipz.runs.results import Results
 from frf_ipz.updating.updated_model import nothing_to_do
 from synthetic_run import Folder, many_frfs, synthetic_folder
@@ -317,3 +319,18 @@ def test_a_run_that_names_no_points_predicts_nothing(tmp_path):
     text = page_of(folder, tmp_path)
     assert '<section id="prediction"' not in text
     assert "and predicts" not in text
+
+
+@pytest.mark.parametrize(("count", "n_figures", "choices"), [(1, 0, []), (2, 1, []), (4, 0, [3])])
+def test_predicted_frfs_beyond_the_first_two_are_there_by_choice(count, n_figures, choices):
+    folder = synthetic_folder(without=("reference",))
+    one = folder.results["predict"]
+    labels = tuple(replace(one.labels[0], input_dof=Dof(node, "z")) for node in range(1, count + 1))
+    wide = {
+        name: np.repeat(getattr(one, name), count, axis=-1)
+        for name in ("values", "nominal", "magnitude_low", "magnitude_high")
+    }
+    folder.results["predict"] = replace(one, labels=labels, **wide)
+    blocks = prediction.build(Results(folder)).blocks
+    assert [len(block.pictures) for block in blocks if block.kind == "choice"] == choices
+    assert sum(block.kind == "figure" for block in blocks) == n_figures

@@ -20,6 +20,7 @@
   const PX_A_TICK = { x: 60, y: 26 }, PX_BESIDE = { x: 118, y: 90 }; // of labels; of margins and legend
   const DECADES_A_TICK = 0.31; // plotly: labels 1, 2 and 5 of each decade for more than 0.3 decades a tick
   const MOST_ROWS_TO_OPEN = 40; // longer tables under pictures are for the screen: on paper they would fill pages
+  const NARROW_PX = 480, FEW_ENTRIES = 6; // a legend of so many entries there is one entry a row
   const decoded = [];
   const drawn = new Map(); // pictures and places by the name of the place, which may hold one of several pictures
   let theme = "light";
@@ -110,12 +111,18 @@
     });
   }
 
+  // On a narrow screen a long legend takes half of a picture: it gets the height of another half.
+  function legendShare(plot, picture) {
+    const entries = new Set(picture.data.filter((trace) => trace.showlegend !== false && trace.name).map((trace) => trace.legendgroup || trace.name));
+    return plot.clientWidth < NARROW_PX && entries.size > FEW_ENTRIES ? 1.6 : 1;
+  }
+
   function draw(name) {
     const figure = document.getElementById(name);
     const picture = pictureIn(figure);
     const plot = figure.querySelector(".plot");
     plot.dataset.height ??= parseFloat(plot.style.height);
-    plot.style.height = `${plot.dataset.height * (printing ? PRINT_SHARE : 1)}px`;
+    plot.style.height = `${plot.dataset.height * (printing ? PRINT_SHARE : legendShare(plot, picture))}px`;
     const config = { responsive: !printing, ...NO_CLOUD, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] };
     Plotly.react(plot, traces(picture, drawn.has(name) && plot.data), themed(unpack(picture.layout), figure), config);
     if (!drawn.has(name)) {

@@ -9,7 +9,7 @@ import numpy as np
 from frf_ipz.plotting.wording import counted, listed, number
 from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.prediction.reference import measured_at
-from frf_ipz.report.section import Section, Table, run_figures
+from frf_ipz.report.section import Block, Choice, Section, Table, run_figures
 from frf_ipz.runs.figures import deviation_of
 
 if TYPE_CHECKING:
@@ -46,9 +46,19 @@ def build(run: Results) -> Section | None:
         anchor="prediction",
         title="Points of interest",
         lead=lead,
-        blocks=(*run_figures(run, "prediction")[1:], _table(prediction, known, with_causes)),
+        blocks=(*_others(run), _table(prediction, known, with_causes)),
         notes=prediction.warnings,
     )
+
+
+def _others(run: Results) -> list[Block]:
+    """Show the FRFs that are not on the first screen: the only one, or any by choice."""
+    others = run_figures(run, "prediction")[1:]
+    if len(others) < 2:
+        return [*others]
+    names = [str(label) for label in run.prediction.labels[1:]] if run.prediction is not None else []
+    pictures = {name: figure.picture for name, figure in zip(names, others, strict=False)}
+    return [Choice(name="other-predictions", label="FRF", pictures=pictures)]
 
 
 def _counts(run: Results) -> bool:
