@@ -35,6 +35,7 @@ TAILS = (2, 4, 8, 16, 32)
 LEAD = 0.25  # of that before the impact: pulses are divided by, whose inverse reaches back
 FINER = 2  # coefficients in a time of one over the band: the error does not repeat beyond it
 SIZES = np.geomspace(1e-4, 1e8, 73)  # variances tried, by that of the coefficient that the lines tell best
+FEWEST_FRFS = 2  # of an excitation: a factor of a single one takes the place of any modes
 MOST_FRFS = 8  # of an excitation, those that weigh most: all have the same error, and few tell it as well
 ROUNDS = 4  # of finding the error, and the modes without it
 ITERATIONS = 4  # of poles, in a round
@@ -131,6 +132,8 @@ def _error_beside(data: WeightedLines, force: IntArray, fit: RefinedPoles, terms
     cost = 0.0
     for number, one in enumerate(forces):
         of_force = np.flatnonzero(force == one)
+        if len(of_force) < FEWEST_FRFS:
+            continue
         best = _best_error(data, modelled, basis, waves, of_force)
         if not best.tail:
             continue

@@ -155,9 +155,14 @@ def _add_and_drop(search: _Search, start: RefinedPoles) -> tuple[RefinedPoles, G
 def _without_force_error(
     search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit
 ) -> tuple[RefinedPoles, GoodnessOfFit]:
-    """Take the error of the force off where poles stand that it could make, and it explains the lines better."""
+    """Take the error of the force off where poles stand that it could make, and it explains the lines better.
+
+    Where the misfit is more than noise, it is left alone: what a structure does by itself would be taken for it.
+    """
+    if not search.noise_is_trusted:
+        return fit, goodness
     doubts = _doubts(search, fit, goodness)
-    # where the model cannot follow to the noise, its level takes the place of the noise: one for all FRFs
+    # on lines where the model does not follow to the noise, its level takes the place of the noise: one for all FRFs
     level = np.exp(np.log(goodness.level).mean(axis=1))
     weighed = replace(search.data, profile=search.data.profile / np.sqrt(level))
     found = _error_beside_best_poles(search, weighed, fit, goodness, doubts)
