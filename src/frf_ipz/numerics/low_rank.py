@@ -12,85 +12,132 @@ from frf_ipz.arrays import ComplexArray, FloatArray, IntArray, Matrix
 
 Vectors: TypeAlias = ComplexArray | FloatArray
 ROUNDING = 1e-10  # of the largest entry or eigenvalue of a matrix
-COLUMNS_AT_ONCE = 1024
 SPARSE = 0.1  # of the entries of all vectors, up to which sparse products are faster
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LowRankMatrices:
-    """Symmetric matrices ``A_p = sum of e q q^T``.
+    """Symmetric matrices ``A_p``: of one entry each, or ``sum of e q q^T``.
 
     Parameters
     ----------
+    rows, columns : (l,) int array
+        Where the entry of each matrix of one entry stands, and by symmetry another.
+    entries : (l,) array
+        These entries.
+    entry_owners : (l,) int array
+        Which matrices these are.
     vectors : (r, m) array
-        All q, those of one matrix next to one another; sparse where most entries are zero.
+        All q of the others, those of one matrix next to one another; sparse where most entries are zero.
     weights : (m,) array
         All e.
     owners : (k,) int array
-        The matrices that are not zero.
+        Those of the others that are not zero.
     starts : (k,) int array
         Where the vectors of each of these begin.
     count : int
         Number of matrices.
     """
 
+    rows: IntArray
+    columns: IntArray
+    entries: FloatArray
+    entry_owners: IntArray
     vectors: FloatArray | Matrix
     weights: FloatArray
     owners: IntArray
     starts: IntArray
     count: int
 
-    def forms(self, left: Vectors, right: Vectors) -> Vectors:
-        """Give ``y^T A_p x`` of pairs of vectors.
+    def forms(self, left: Vectors, right: Vectors) -> FloatArray:
+        """Give the real parts of ``y^T A_p x`` of pairs of vectors.
 
         Parameters
         ----------
-        left, right : (r, n) complex array
+        left, right : (r, n) array
             y and x.
 
         Returns
         -------
         (n, p) array
-            Of every pair and matrix; real where all vectors are.
+            Of every pair and matrix.
         """
-        own = self.own_forms(left, right)
-        shape = (left.shape[1], self.count)
-        result: Vectors = np.zeros(shape, np.complex128) if np.iscomplexobj(own) else np.zeros(shape)
-        result[:, self.owners] = own
+        result = np.zeros((left.shape[1], self.count))
+        self.add_forms(result, left, right)
         return result
 
-    def own_forms(self, left: Vectors, right: Vectors) -> Vectors:
-        """Give ``y^T A_p x`` of those matrices that are not zero.
+    def add_forms(self, result: FloatArray, left: Vectors, right: Vectors) -> None:
+        """Add the real parts of ``y^T A_p x`` to a result: some hundred pairs at a time stay in the cache.
 
         Parameters
         ----------
-        left, right : (r, n) complex array
+        result : (n, p) array
+            What they are added to.
+        left, right : (r, n) array
             y and x.
-
-        Returns
-        -------
-        (n, k) array
-            In the order of `owners`; real where all vectors are.
         """
-        y, x = (left, right) if _are_complex(left, right) else (left.real, right.real)
-        shape = (y.shape[1], len(self.owners))
-        result: Vectors = np.zeros(shape, np.complex128) if np.iscomplexobj(y) else np.zeros(shape)
-        if not len(self.owners):
-            return result
-        turned = self.vectors.T
-        for first in range(0, y.shape[1], COLUMNS_AT_ONCE):
-            part = slice(first, first + COLUMNS_AT_ONCE)
-            products = np.asarray(turned @ y[:, part]) * np.asarray(turned @ x[:, part]) * self.weights[:, None]
-            result[part] = np.add.reduceat(products, self.starts, axis=0).T
-        return result
+        self._add(result, left.real, right.real, 1.0)
+        if np.any(left.imag) and np.any(right.imag):
+            self._add(result, left.imag, right.imag, -1.0)
+
+    def _add(self, result: FloatArray, left: FloatArray, right: FloatArray, sign: float) -> None:
+        if len(self.entries):
+            y, x = np.ascontiguousarray(left.T), np.ascontiguousarray(right.T)
+            forms = np.take(y, self.rows, axis=1)
+            forms *= np.take(x, self.columns, axis=1)
+            mirrored = np.take(y, self.columns, axis=1)
+            mirrored *= np.take(x, self.rows, axis=1)
+            forms += mirrored
+            forms *= sign * np.where(self.rows == self.columns, 0.5, 1.0) * self.entries
+            result[:, _places(self.entry_owners)] += forms
+        if len(self.owners):
+            turned = self.vectors.T
+            products = np.asarray(turned @ left) * np.asarray(turned @ right) * (sign * self.weights[:, None])
+            if len(self.starts) < len(products):
+                products = np.add.reduceat(products, self.starts, axis=0)
+            result[:, _places(self.owners)] += products.T
 
 
-def _are_complex(left: Vectors, right: Vectors) -> bool:
-    return bool(np.any(left.imag) or np.any(right.imag))
+def _places(indices: IntArray) -> IntArray | slice:
+    """Give ascending indices as a slice where none is left out."""
+    first, last = int(indices[0]), int(indices[-1])
+    return slice(first, last + 1) if last - first + 1 == len(indices) else indices
+
+
+def of_entries(rows: IntArray, columns: IntArray) -> LowRankMatrices:
+    """Give matrices that are 1 at one place each, and at the place opposite.
+
+    Parameters
+    ----------
+    rows, columns : (p,) int array
+        The places.
+
+    Returns
+    -------
+    LowRankMatrices
+        One matrix a place.
+
+    Examples
+    --------
+    >>> of_entries(np.array([0]), np.array([1])).forms(np.eye(2)[:, :1], np.array([[2.0], [3.0]])).tolist()
+    [[3.0]]
+    """
+    nothing = np.zeros(0, np.int64)
+    return LowRankMatrices(
+        rows=rows,
+        columns=columns,
+        entries=np.ones(len(rows)),
+        entry_owners=np.arange(len(rows)),
+        vectors=np.zeros((0, 0)),
+        weights=np.zeros(0),
+        owners=nothing,
+        starts=nothing,
+        count=len(rows),
+    )
 
 
 def factorise(matrices: FloatArray) -> LowRankMatrices:
-    """Find the vectors of matrices of low rank.
+    """Find the entries or vectors of matrices that have few.
 
     Parameters
     ----------
@@ -109,13 +156,23 @@ def factorise(matrices: FloatArray) -> LowRankMatrices:
     [[0.0, 2.0], [0.0, 0.0]]
     """
     order = matrices.shape[1]
+    of_one: list[int] = []
+    at_row: list[int] = []
+    at_column: list[int] = []
     vectors, weights, owners, starts, used = [], [], [], [], 0
     for number, matrix in enumerate(matrices):
         size = np.abs(matrix).max(axis=1, initial=0.0)
         rows = np.flatnonzero(size > ROUNDING * size.max(initial=0.0))
         if not len(rows):
             continue
-        values, directions = np.linalg.eigh(matrix[np.ix_(rows, rows)])
+        small = matrix[np.ix_(rows, rows)]
+        upper = np.argwhere(np.triu(np.abs(small) > ROUNDING * size.max()))
+        if len(upper) == 1:
+            of_one.append(number)
+            at_row.append(int(rows[upper[0, 0]]))
+            at_column.append(int(rows[upper[0, 1]]))
+            continue
+        values, directions = np.linalg.eigh(small)
         kept = np.abs(values) > ROUNDING * np.abs(values).max()
         whole = np.zeros((order, int(kept.sum())))
         whole[rows] = directions[:, kept]
@@ -126,6 +183,10 @@ def factorise(matrices: FloatArray) -> LowRankMatrices:
         used += whole.shape[1]
     joined = np.hstack(vectors) if vectors else np.zeros((order, 0))
     return LowRankMatrices(
+        rows=np.array(at_row, np.int64),
+        columns=np.array(at_column, np.int64),
+        entries=np.array([matrices[place] for place in zip(of_one, at_row, at_column, strict=True)], float),
+        entry_owners=np.array(of_one, np.int64),
         vectors=sparse.csr_array(joined) if np.count_nonzero(joined) < SPARSE * joined.size else joined,
         weights=np.concatenate(weights) if weights else np.zeros(0),
         owners=np.array(owners, np.int64),

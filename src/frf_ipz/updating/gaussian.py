@@ -24,7 +24,8 @@ pivots of the information (LAPACK's ``pstrf``), and keep their prior.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +34,7 @@ from scipy.linalg import cho_solve, cholesky, lapack
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from frf_ipz.updating.parameters import PriorTerm
     from frf_ipz.updating.target_noise import TargetNoise
@@ -48,7 +49,7 @@ MAX_HALVINGS = 10
 ROWS_AT_ONCE = 4096
 ALIKE = 1e-4  # relative, of the noise of each datum: none is known as well
 LARGEST_SHARES = 1e3  # in a mixture: what rounding may grow by
-UNTOLD = 1e-6  # of the prior's information: a deviation that so few data narrow is the prior's to seven digits
+UNTOLD = 1e-4  # of the prior's information: a deviation that so few data narrow is the prior's to four digits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -240,7 +241,7 @@ class Linearised:
             [p if basis is None else p @ basis for p, basis in zip(pieces, self.bases, strict=True)], axis=-1
         )
 
-    def products(self, weights: FloatArray, scales: FloatArray) -> FloatArray:
+    def products(self, weights: FloatArray, scales: FloatArray, *, beside: FloatArray | None = None) -> FloatArray:
         """Add up products of sensitivity and data over all data.
 
         Parameters
@@ -249,6 +250,8 @@ class Linearised:
             Of the data, positive.
         scales : (t,) array
             Standard deviations of the terms.
+        beside : (n,) array, optional
+            Weights that the error of a mixture is relative to; `weights` where they are left out.
 
         Returns
         -------
@@ -257,22 +260,21 @@ class Linearised:
         """
         sizes = [part.shape[1] for part in self.parts]
         factors = np.concatenate([np.ones(self.common.shape[1]), np.repeat(scales, sizes), np.ones(1)])
-        return np.asarray(self._sum(weights) * factors[:, None] * factors)
+        return np.asarray(self._sum(weights, weights if beside is None else beside) * factors[:, None] * factors)
 
-    def _sum(self, weights: FloatArray) -> FloatArray:
+    def _sum(self, weights: FloatArray, beside: FloatArray) -> FloatArray:
         if self.sums:
-            known = np.stack([others / weights for others, _ in self.sums], axis=1)
-            shares = np.linalg.lstsq(known, np.ones(len(weights)), rcond=None)[0]
-            is_alike = bool(np.all(np.abs(known @ shares - 1) < ALIKE))
-            if is_alike and np.abs(shares) @ known.max(axis=0) < LARGEST_SHARES:
-                return np.asarray(np.tensordot(shares, np.stack([each for _, each in self.sums]), 1))
-        size = self.common.shape[1] + sum(part.shape[1] for part in self.parts) + 1
-        total = np.zeros((size, size))
-        for first in range(0, len(weights), ROWS_AT_ONCE):
-            rows = slice(first, first + ROWS_AT_ONCE)
-            joined = np.hstack([self.common[rows], *(part[rows] for part in self.parts), self.data[rows, None]])
-            joined *= np.sqrt(weights[rows])[:, None]
-            total += joined.T @ joined
+            known = np.stack([others / beside for others, _ in self.sums], axis=1)
+            sizes = known.max(axis=0)
+            known /= sizes
+            shares = np.linalg.lstsq(known, weights / beside, rcond=None)[0]
+            is_alike = bool(np.all(np.abs(known @ shares - weights / beside) < ALIKE))
+            if is_alike and np.abs(shares).sum() < LARGEST_SHARES:
+                mixed = np.zeros_like(self.sums[0][1])
+                for share, (_, total) in zip(shares / sizes, self.sums, strict=True):
+                    mixed += share * total
+                return mixed
+        total = _sum_of_products(self.common, self.parts, self.data, weights)
         self.sums.append((weights, total))
         return total
 
@@ -300,18 +302,19 @@ class Linearised:
 
 
 def linearise(
-    parts: Sequence[FloatArray],
+    parts: Iterable[FloatArray],
     data: FloatArray,
     noise: TargetNoise,
     slack: FloatArray | None = None,
     *,
     scales: FloatArray | None = None,
+    combining: bool = True,
 ) -> Linearised:
     """Diagonalise the noise of linear data, and find the combinations of parameters that they tell of.
 
     Parameters
     ----------
-    parts : sequence of (n, k_i) arrays
+    parts : iterable of (n, k_i) arrays
         Sensitivity of the data to each term's unit normal numbers, for a standard deviation of 1.
     data : (n,) array
         d.
@@ -321,6 +324,8 @@ def linearise(
         Standard deviations of what no parameter explains, for a factor of 1.
     scales : (t,) array, optional
         Standard deviations of the terms, about which it is judged what data tell; 1 by default.
+    combining : bool
+        False where data are solved for once or twice: to find the combinations would cost more than it saves.
 
     Returns
     -------
@@ -336,34 +341,113 @@ def linearise(
         places.append(part)
     turned = tuple(axes), tuple(places), units
     level = np.concatenate(levels) if levels else np.zeros(0)
-    stds = np.ones(len(parts)) if scales is None else scales
-    told = [_told(_rotated(*turned, part), level / std**2) for part, std in zip(parts, stds, strict=False)]
+    turned_parts = tuple(_rotated(*turned, part) for part in parts)
+    common, values_of_data = _rotated(*turned, noise.common), _rotated(*turned, data)
+    bases: tuple[FloatArray | None, ...] = (None,) * len(turned_parts)
+    sums: list[tuple[FloatArray, FloatArray]] = []
+    if combining and turned_parts:
+        stds = np.ones(len(turned_parts)) if scales is None else scales
+        total = _sum_of_products(common, turned_parts, values_of_data, 1 / level)
+        ends = np.cumsum([common.shape[1], *(part.shape[1] for part in turned_parts)])
+        columns = [slice(first, end) for first, end in pairwise(ends.tolist())]
+        bases = tuple(_told(total[at, at] * std**2) for at, std in zip(columns, stds, strict=False))
+        turned_parts = tuple(p if b is None else p @ b for p, b in zip(turned_parts, bases, strict=True))
+        if np.isfinite(total).all():
+            sums.append((1 / level, _combined(total, columns, bases)))
     return Linearised(
-        data=_rotated(*turned, data),
-        parts=tuple(part for part, _ in told),
-        bases=tuple(basis for _, basis in told),
-        common=_rotated(*turned, noise.common),
+        data=values_of_data,
+        parts=turned_parts,
+        bases=bases,
+        common=common,
         level=level,
         axes=turned[0],
         places=turned[1],
         slack=units,
+        sums=sums,
     )
 
 
-def _told(part: FloatArray, level: FloatArray) -> tuple[FloatArray, FloatArray | None]:
-    """Find combinations that data tell of; the prior is the same along all of them, and with slack data tell less."""
-    information = np.zeros((part.shape[1],) * 2)
-    for first in range(0, len(part), ROWS_AT_ONCE):
+def with_more_noise(linear: Linearised, noise: TargetNoise, datum: int) -> Linearised:
+    """Diagonalise the noise of one block of data again: that of the others is as it was.
+
+    Parameters
+    ----------
+    linear : Linearised
+        The data, with combinations of the parameters that were found without slack.
+    noise : TargetNoise
+        With more noise of a datum.
+    datum : int
+        Which one.
+
+    Returns
+    -------
+    Linearised
+        The same data under that noise; with less information the combinations hold all the more.
+    """
+    blocks = zip(linear.blocks(), noise.parts(), strict=True)
+    rows, vectors, place, block = next(
+        (rows, vectors, place, block) for (rows, place, vectors), (_, block) in blocks if datum in place
+    )
+    units = linear.slack[place]
+    values, new_vectors = np.linalg.eigh(block / np.outer(units, units))
+    turn = new_vectors.T @ vectors
+
+    def turned(before: FloatArray) -> FloatArray:
+        after = before.copy()
+        after[rows] = turn @ before[rows]
+        return after
+
+    level = linear.level.copy()
+    level[rows] = np.maximum(values, np.finfo(float).tiny)
+    changed = replace(
+        linear,
+        data=turned(linear.data),
+        parts=tuple(turned(part) for part in linear.parts),
+        common=turned(linear.common),
+        level=level,
+        axes=tuple(new_vectors if axes is vectors else axes for axes in linear.axes),
+        sums=[],
+    )
+
+    def own(each: Linearised) -> FloatArray:
+        parts = tuple(part[rows] for part in each.parts)
+        return _sum_of_products(each.common[rows], parts, each.data[rows], 1 / each.level[rows])
+
+    total = linear.products(1 / linear.level, np.ones(len(linear.parts)))
+    changed.sums.append((1 / level, total - own(linear) + own(changed)))
+    return changed
+
+
+def _sum_of_products(
+    common: FloatArray, parts: tuple[FloatArray, ...], data: FloatArray, weights: FloatArray
+) -> FloatArray:
+    size = common.shape[1] + sum(part.shape[1] for part in parts) + 1
+    total = np.zeros((size, size))
+    for first in range(0, len(weights), ROWS_AT_ONCE):
         rows = slice(first, first + ROWS_AT_ONCE)
-        weighted = part[rows] / np.sqrt(level[rows, None])
-        information += weighted.T @ weighted
-    factor, pivots, rank, _ = lapack.dpstrf(information, tol=UNTOLD, lower=1, overwrite_a=1)
+        joined = np.hstack([common[rows], *(part[rows] for part in parts), data[rows, None]])
+        joined *= np.sqrt(weights[rows])[:, None]
+        total += joined.T @ joined
+    return total
+
+
+def _combined(total: FloatArray, places: Sequence[slice], bases: Sequence[FloatArray | None]) -> FloatArray:
+    """Products of combinations from those of all parameters."""
+    for at, basis in zip(reversed(places), reversed(bases), strict=True):
+        if basis is not None:
+            total = np.vstack([total[: at.start], basis.T @ total[at], total[at.stop :]])
+            total = np.hstack([total[:, : at.start], total[:, at] @ basis, total[:, at.stop :]])
+    return total
+
+
+def _told(information: FloatArray) -> FloatArray | None:
+    """Find combinations that data tell of; the prior is the same along all of them, and with slack data tell less."""
+    factor, pivots, rank, _ = lapack.dpstrf(information, tol=UNTOLD, lower=1)
     if rank == len(information):
-        return part, None
+        return None
     directions = np.zeros((len(information), rank))
-    directions[pivots - 1] = np.tril(factor)[:, :rank]
-    basis = np.linalg.qr(directions)[0]
-    return part @ basis, basis
+    directions[pivots - 1] = np.tril(factor[:, :rank])
+    return np.asarray(np.linalg.qr(directions)[0])
 
 
 def _rotated(
@@ -372,8 +456,7 @@ def _rotated(
     result = np.empty(rows.shape)
     first = 0
     for place, vectors in zip(places, axes, strict=True):
-        units = slack[place] if rows.ndim == 1 else slack[place, None]
-        result[first : first + len(place)] = vectors.T @ (rows[place] / units)
+        result[first : first + len(place)] = (vectors.T / slack[place]) @ rows[place]
         first += len(place)
     return result
 
@@ -441,7 +524,7 @@ def distance_to_optimum(
     for rows, columns in linear.columns(scales):
         right += columns.T @ (weights[rows] * (turned[rows] + columns[:, n_common:] @ now))
     change = cho_solve((step.root, False), right, check_finite=False)[n_common:] - now
-    beyond = max(float(whitened @ whitened - now @ now), 0.0)  # along combinations that no datum moves
+    beyond = float(np.sum((whitened - linear.whole(now)) ** 2))  # along combinations that no datum moves
     return float(np.sqrt(np.sum((step.root[n_common:, n_common:] @ change) ** 2) + beyond))
 
 
@@ -673,7 +756,7 @@ class _ScaleSearch:
         """Slope by the logarithm of the slack, and its row of the expected curvature."""
         linear, square = self.linear, factor**2
         weights = 1 / (linear.level + square)
-        products = linear.products(weights**2, scales)
+        products = linear.products(square * weights**2, scales, beside=weights) / square
         told = products[:-1, :-1]  # by how much the information falls
         error = np.concatenate([-mean, np.ones(1)])
         misfit = float(error @ products @ error)

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 from scipy.spatial.distance import cdist
 
 from frf_ipz.arguments import require_type
@@ -78,9 +77,14 @@ class PriorTerm(Concise):
         Returns
         -------
         (n, k) array
-            ``slopes @ root``: most parameters depend on one number only.
+            ``slopes @ root``: most numbers move one parameter only.
         """
-        return np.asarray((sparse.csr_array(self.root).T @ slopes.T).T)
+        is_used = self.root != 0.0
+        if np.all(np.count_nonzero(is_used, axis=0) == 1):
+            rows = np.argmax(is_used, axis=0)
+            return np.asarray(np.take(slopes, rows, axis=1) * self.root[rows, np.arange(len(rows))])
+        used = np.flatnonzero(is_used.any(axis=1))
+        return np.asarray(slopes[:, used] @ self.root[used])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)

@@ -14,7 +14,7 @@ from scipy.optimize import linear_sum_assignment
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NumericalError
 from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros, undamped_poles, undamped_zeros
-from frf_ipz.numerics.pole_forms import PoleForm, damped_form, undamped_form
+from frf_ipz.numerics.pole_forms import PoleForm, damped_form, every_damped_zero, undamped_form
 
 SAME_ROOT = 0.5  # overlap of its vectors with those before, above which no other root can be more alike
 APART = 1e-9  # relative distance below which two zeros of an FRF are one
@@ -92,6 +92,29 @@ class TargetRoots:
             Motion of the excited DOF.
         """
         return np.array([self.rows[number][1] for number in self.frf[targets].tolist()])
+
+    def every_zero(
+        self, frfs: list[tuple[int, IntArray]], mass: FloatArray, damping: FloatArray, stiffness: FloatArray
+    ) -> list[Roots]:
+        """Compute all zeros of some FRFs.
+
+        Parameters
+        ----------
+        frfs : list of (int, int array)
+            Numbers of the FRFs, and anything.
+        mass, damping, stiffness : (r, r) array
+            The model.
+
+        Returns
+        -------
+        list of Roots
+            Of each FRF those with an imaginary part of at least 0, rad/s.
+        """
+        if not frfs:
+            return []
+        pairs = [self.rows[number] for number, _ in frfs]
+        outputs, inputs = (np.array([pair[side] for pair in pairs]) for side in range(2))
+        return every_damped_zero(mass, damping, stiffness, outputs, inputs)
 
     def near(self, form: PoleForm, start: ComplexArray, targets: IntArray) -> tuple[Roots, BoolArray]:
         """Find zeros from near.
@@ -265,8 +288,9 @@ def with_damping(
         start = s - np.sum(old.left_vectors * (damping @ old.right_vectors), axis=0) / (2 * old.slope)
         new, found = targets.near(damped_form(mass, damping, stiffness), start, indices)
         found &= (new.values.imag > 0) & (_own_overlap(old, new, mass, new.slope / (2 * new.values)) > SAME_ROOT)
-        for number, members in _lost(targets, indices, found):
-            every = upper_of(damped_zeros(mass, damping, stiffness, *targets.rows[number]))
+        lost = _lost(targets, indices, found)
+        for (_, members), roots in zip(lost, targets.every_zero(lost, mass, damping, stiffness), strict=True):
+            every = upper_of(roots)
             overlap = _overlap(old.take(members), every, mass, every.slope / (2 * every.values))
             _put(new, members, every.take(_assign(-overlap)))
         groups.append((indices, new))
@@ -307,9 +331,10 @@ def nearest_roots(
         roots, found = targets.near(damped_form(mass, damping, stiffness), reference[zeros], zeros)
         found &= np.abs(roots.values - reference[zeros]) < UNMOVED * np.abs(reference[zeros])
         values[zeros] = np.where(found, roots.values, 0.0)
-        for number, members in _lost(targets, zeros, found):
+        lost = _lost(targets, zeros, found)
+        for (_, members), every in zip(lost, targets.every_zero(lost, mass, damping, stiffness), strict=True):
             values[zeros[members]] = 0.0
-            assign(zeros[members], damped_zeros(mass, damping, stiffness, *targets.rows[number]).values)
+            assign(zeros[members], every.values)
     return values
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from frf_ipz.numerics.low_rank import factorise
+from frf_ipz.numerics.low_rank import factorise, of_entries
 
 ORDER = 9
 
@@ -24,11 +24,25 @@ def test_forms_are_those_of_the_matrices(symmetric, imaginary):
         rng.standard_normal((ORDER, 20)) + 1j * imaginary * rng.standard_normal((ORDER, 20)) for _ in range(2)
     )
     expected = np.einsum("in,pij,jn->np", left, symmetric, right)
-    assert np.abs(factorise(symmetric).forms(left, right) - expected).max() < 1e-9 * np.abs(expected).max()
+    assert np.abs(factorise(symmetric).forms(left, right) - expected.real).max() < 1e-9 * np.abs(expected).max()
 
 
-def test_a_pair_of_modes_needs_two_vectors(symmetric):
-    assert factorise(symmetric[-1:]).vectors.shape == (ORDER, 2)
+def test_a_pair_of_modes_is_one_entry(symmetric):
+    found = factorise(symmetric[-1:])
+    assert (found.rows.tolist(), found.columns.tolist(), found.entries.tolist()) == ([1], [4], [3.0])
+    assert found.vectors.shape == (ORDER, 0)
+
+
+def test_an_entry_of_the_diagonal_counts_once():
+    assert factorise(np.diag([0.0, 2.0])[None]).forms(np.ones((2, 1)), np.ones((2, 1))).tolist() == [[2.0]]
+    assert of_entries(np.array([1]), np.array([1])).forms(np.ones((2, 1)), np.ones((2, 1))).tolist() == [[1.0]]
+
+
+def test_forms_are_added_to_what_is_there(symmetric):
+    forms, some = factorise(symmetric), np.ones((ORDER, 3))
+    total = forms.forms(some, some)
+    forms.add_forms(total, some, -some)
+    assert np.abs(total).max() < 1e-12
 
 
 def test_no_matrices_have_no_forms():

@@ -13,6 +13,7 @@ from frf_ipz.updating.gaussian import (
     most_likely_scales,
     solve_step,
     step_by_discrepancy,
+    with_more_noise,
 )
 from frf_ipz.updating.parameters import PriorTerm
 from frf_ipz.updating.target_noise import TargetNoise, noise_of
@@ -250,3 +251,16 @@ def test_groups_of_data_need_not_be_next_to_one_another(many):
     sensitivity, data = many[0][order], many[1][order]
     step = solve_step(linearise([sensitivity], data, turned), np.ones(1))
     assert_allclose(step.mean, posterior(sensitivity, data, matrix[np.ix_(order, order)])[0], rtol=1e-9)
+
+
+def test_more_noise_of_a_datum_is_that_of_its_block(many):
+    sensitivity, data, noise = many
+    more = noise.plus(5.0 * (np.arange(len(data)) == 7))
+    changed, again = (
+        with_more_noise(linearise([sensitivity], data, noise), more, 7),
+        linearise([sensitivity], data, more),
+    )
+    for factor in (0.0, 0.7):
+        first, second = (solve_step(linear, np.ones(1), factor) for linear in (changed, again))
+        assert_allclose(first.mean, second.mean, rtol=1e-9)
+        assert_allclose(first.misfit, second.misfit, rtol=1e-9)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.numerics.low_rank import factorise
+from frf_ipz.numerics.low_rank import factorise, of_entries
 from frf_ipz.rational import damping_ratio
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, unwhiten
@@ -34,6 +34,7 @@ NO_DAMPING = 1e-3  # of the typical rate: a model with less states no damping fo
 POLE_SLACK = 1e-3  # relative standard deviation of a pole's real part that no damping matrix explains
 ZERO_SLACK = 0.02  # the same of a zero, which depends on mode shapes too, and these are not known better
 MOST_COUPLED_MODES = 48  # the lowest: as many as may change each other's stiffness; higher ones lie far above the band
+ROWS_AT_ONCE = 256  # of the derivatives: they stay in the cache
 INDEFINITE = 1e-9  # part of the largest rate below which a negative eigenvalue is rounding
 
 
@@ -188,17 +189,22 @@ class DampingPhase:
         modal_damping = self._modal_damping(theta)
         rates = self._mode_rates(theta)
         couplings = np.sqrt(rates[row] * rates[column])
-        result = np.zeros((len(self.targets), len(theta)))
-        extra = factorise(self.extra)
+        result = np.empty((len(self.targets), len(theta)))
+        extra, by_coupling = factorise(self.extra), of_entries(row, column)
+        ends = np.cumsum([1, len(rates), len(row)])
         for indices, roots in tracked.groups:
             # by each entry of the damping matrix: -s y x^T / slope; every parameter is a sum over entries
             x, y = roots.right_vectors, roots.left_vectors * (roots.values / roots.slope)
             by_mode = (y * (modal_damping @ x) + x * (modal_damping @ y)).real.T / 2
-            result[indices, :1] = by_mode.sum(axis=1, keepdims=True)
-            result[indices, 1 : 1 + len(rates)] = by_mode
-            result[indices, 1 + len(rates) : 1 + len(rates) + len(row)] = _by_coupling(x, y, row, column) * couplings
-            result[indices, 1 + len(rates) + len(row) :] = extra.forms(y, x).real
-        return result / self.sizes[:, None]
+            for first in range(0, len(indices), ROWS_AT_ONCE):
+                part = slice(first, first + ROWS_AT_ONCE)
+                rows = np.empty((len(indices[part]), len(theta)))
+                rows[:, :1] = by_mode[part].sum(axis=1, keepdims=True)
+                rows[:, 1 : ends[1]] = by_mode[part]
+                rows[:, ends[1] : ends[2]] = by_coupling.forms(y[:, part], x[:, part]) * couplings
+                rows[:, ends[2] :] = extra.forms(y[:, part], x[:, part])
+                result[indices[part]] = rows / self.sizes[indices[part], None]
+        return result
 
     def _mode_rates(self, theta: FloatArray) -> FloatArray:
         """Rates of the modes."""
@@ -235,14 +241,6 @@ class DampingPhase:
         """
         largest = float(np.abs((proposed - theta)[: 1 + len(self.rates)]).max())
         return min(1.0, LARGEST_STEP / max(largest, np.finfo(float).tiny))
-
-
-def _by_coupling(x: ComplexArray, y: ComplexArray, row: IntArray, column: IntArray) -> FloatArray:
-    """Differentiate by symmetric pairs of entries of the damping matrix, (n, n_pairs)."""
-    result = (x.real[row] * y.real[column] + x.real[column] * y.real[row]).T
-    if np.any(x.imag) or np.any(y.imag):
-        result -= (x.imag[row] * y.imag[column] + x.imag[column] * y.imag[row]).T
-    return np.asarray(result)
 
 
 def damping_phase(

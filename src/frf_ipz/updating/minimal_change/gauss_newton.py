@@ -220,10 +220,13 @@ def iterate(
     nonlinearity, rows, converged = CURVATURE * state.error**2, [], False
     for iteration in range(1, (max_iterations or MAX_ITERATIONS) + 1):
         slopes = phase.slopes(state.theta, state.tracked)
-        parts = [term.by_whitened(slopes) for term in phase.terms]
         data = state.error + slopes @ state.theta
-        linear = linearise(parts, data, phase.noise.plus(nonlinearity**2), phase.slack, scales=scales[:-1])
-        if not scales_are_held and iteration <= SCALE_ITERATIONS:
+        searching = not scales_are_held and iteration <= SCALE_ITERATIONS
+        now = phase.noise.plus(nonlinearity**2)
+        parts = (term.by_whitened(slopes) for term in phase.terms)
+        linear = linearise(parts, data, now, phase.slack, scales=scales[:-1], combining=searching)
+        del slopes  # as large as all that is kept of it
+        if searching:
             new_scales = most_likely_scales(linear, terms, scales)
             state = replace(state, whitened=_rescaled(phase.terms, scales / new_scales, state.whitened))
             scales = new_scales

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.updating.gaussian import linearise, most_contradicted, most_likely_scales
+from frf_ipz.updating.gaussian import linearise, most_contradicted, most_likely_scales, with_more_noise
 
 if TYPE_CHECKING:
     from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult
@@ -45,19 +45,20 @@ def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots, theta: Floa
     """
     error = phase.errors(start)
     slopes = phase.slopes(theta, start)
-    parts = [term.by_whitened(slopes) for term in phase.terms]
     noise = phase.noise.plus((CURVATURE * error**2) ** 2)
     data = error + slopes @ theta
     scales = np.array([term.std for term in phase.terms])
     outliers: list[int] = []
+    linear = linearise((term.by_whitened(slopes) for term in phase.terms), data, noise, scales=scales)
+    del slopes  # large
     while len(outliers) <= MAX_SHARE * len(error):
-        linear = linearise(parts, data, noise, scales=scales)
         scales = most_likely_scales(linear, phase.terms, scales)
         worst = most_contradicted(linear, scales, CONTRADICTED, least=MIN_ERROR)
         if worst < 0:
             return np.array(outliers, int), scales
         outliers.append(worst)
         noise = noise.plus(EXCLUDED_STD**2 * (np.arange(len(error)) == worst))
+        linear = with_more_noise(linear, noise, worst)
     # so many contradictions are no exception: the model is far off, and all targets count
     return np.array([], int), np.array([term.std for term in phase.terms])
 

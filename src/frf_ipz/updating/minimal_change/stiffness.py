@@ -19,6 +19,7 @@ from frf_ipz.updating.tracking import TargetRoots, TrackedRoots, nominal_roots, 
 
 POLE_SLACK = 1e-7  # relative standard deviation of a true pole that a reduced model cannot express: it has its modes
 ZERO_SLACK = 1e-5  # the same of a zero, which depends on the modes beyond as well
+ROWS_AT_ONCE = 256  # of the derivatives: they stay in the cache
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -150,20 +151,18 @@ class StiffnessPhase:
         (n, p) array
             Per unit of the parameters.
         """
-        result = np.zeros((len(self.targets), len(theta)))
+        result = np.empty((len(self.targets), len(theta)))
+        by_amount = self.basis.slopes(theta)
         for indices, roots in tracked.groups:
-            change = self.by_stiffness.forms(roots.left_vectors, roots.right_vectors)
-            if self.changes_mass:
-                by_mass = self.by_mass.own_forms(roots.left_vectors, roots.right_vectors)
-                is_real = np.isrealobj(change) and np.isrealobj(by_mass) and not np.any(roots.values.imag)
-                values = roots.values.real if is_real else roots.values
-                change = change if is_real else change.astype(complex)
-                change[:, self.by_mass.owners] -= values[:, None] * by_mass
-            scale = 0.5 / (roots.slope * roots.values)
-            result[indices] = scale.real[:, None] * change.real
-            if np.any(change.imag):
-                result[indices] -= scale.imag[:, None] * change.imag
-        return result * self.basis.slopes(theta)
+            left = roots.left_vectors * (0.5 / (roots.slope * roots.values))
+            by_mass = left * -roots.values if self.changes_mass else left
+            for first in range(0, len(indices), ROWS_AT_ONCE):
+                part = slice(first, first + ROWS_AT_ONCE)
+                change = self.by_stiffness.forms(left[:, part], roots.right_vectors[:, part])
+                if self.changes_mass:
+                    self.by_mass.add_forms(change, by_mass[:, part], roots.right_vectors[:, part])
+                result[indices[part]] = change * by_amount
+        return result
 
     def history_columns(self, theta: FloatArray) -> dict[str, float]:
         """Give the factor on the stiffness of every region, updated over nominal.
