@@ -273,6 +273,22 @@ def _newton(
     return np.asarray(values), found
 
 
+def are_symmetric(*matrices: FloatArray) -> bool:
+    """Tell whether matrices are symmetric to rounding, as a form over poles needs them.
+
+    Parameters
+    ----------
+    *matrices : (r, r) array
+        The model.
+
+    Returns
+    -------
+    bool
+        True where all are.
+    """
+    return all(np.abs(matrix - matrix.T).max() <= SYMMETRIC * np.abs(matrix).max() for matrix in matrices)
+
+
 def every_damped_zero(
     mass: FloatArray, damping: FloatArray, stiffness: FloatArray, outputs: FloatArray, inputs: FloatArray
 ) -> list[Roots]:
@@ -293,10 +309,10 @@ def every_damped_zero(
     list of Roots
         Of each FRF those with an imaginary part of at least 0, rad/s.
     """
+    if not len(outputs):
+        return []
     forms = None
-    if all(
-        np.abs(matrix - matrix.T).max() <= SYMMETRIC * np.abs(matrix).max() for matrix in (mass, damping, stiffness)
-    ):
+    if are_symmetric(mass, damping, stiffness):
         forms = undamped_form(mass, stiffness), damped_form(mass, damping, stiffness)
     found: list[Roots] = []
     for output, force in zip(outputs, inputs, strict=True):

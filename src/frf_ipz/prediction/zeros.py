@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.numerics.pole_forms import every_damped_zero
-from frf_ipz.pairing.model_roots import model_zeros
+from frf_ipz.numerics.pole_forms import are_symmetric, damped_form, every_damped_zero
+from frf_ipz.pairing.model_roots import ModelZeros, model_zeros
 from frf_ipz.rational import ZeroSet
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 MAX_MEMBERS = 100  # of the ensemble: enough for a standard deviation
 SAME_ZERO = 0.2  # relative distance within which a member's zero can be the same one
+HALFWAY = 0.5  # of the distance to the next zero
 MIN_SHARE = 0.8  # part of the members that must have the zero
 MAX_STD = 0.05  # relative standard deviation up to which a zero is known
 GAUSSIAN = 0.6745  # median absolute deviation over standard deviation
@@ -51,14 +53,13 @@ def predicted_zeros(
     frf: list[int] = []
     kinds: list[str] = []
     spread: list[tuple[float, float, float]] = []
-    of_members = _zeros_of_members(model, ensemble[:MAX_MEMBERS], labels)
-    for number, zeros in enumerate(model_zeros(model, labels)):
-        inside = (np.abs(zeros.values) > band_rad_s[0]) & (np.abs(zeros.values) < band_rad_s[1])
-        indices = np.flatnonzero(inside & (np.array(zeros.kind) != "real"))
-        values += zeros.values[indices].tolist()
-        kinds += [zeros.kind[index] for index in indices]
-        frf += [number] * len(indices)
-        spread += _spread([member[number] for member in of_members], zeros.values[indices])
+    found = [_Inside.of(zeros, band_rad_s) for zeros in model_zeros(model, labels)]
+    nearest = _nearest_of_members(model, ensemble[:MAX_MEMBERS], labels, found)
+    for number, (inside, of_members) in enumerate(zip(found, nearest, strict=True)):
+        values += inside.values.tolist()
+        kinds += inside.kinds
+        frf += [number] * len(inside.values)
+        spread += _spread(of_members, inside.values)
     std = np.array(spread, float).reshape(-1, 3)
     reasons = tuple(_reason(value, row) for value, row in zip(values, std, strict=True))
     zero_set = ZeroSet(
@@ -71,29 +72,69 @@ def predicted_zeros(
     return zero_set, std[:, :2]
 
 
-def _zeros_of_members(
-    model: ReducedModel, ensemble: FloatArray, labels: Sequence[FrfLabel]
-) -> list[list[ComplexArray]]:
-    """Zeros of every FRF, of each member."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Inside:
+    """Zeros of an FRF in the band with their kinds, and the distance of each from the next of all zeros."""
+
+    values: ComplexArray
+    kinds: tuple[str, ...]
+    gaps: FloatArray
+
+    @classmethod
+    def of(cls, zeros: ModelZeros, band_rad_s: tuple[float, float]) -> _Inside:
+        """Choose from all zeros of an FRF."""
+        kinds = np.array(zeros.kind, str)
+        size = np.abs(zeros.values)
+        chosen = np.flatnonzero((size > band_rad_s[0]) & (size < band_rad_s[1]) & (kinds != "real"))
+        every = np.concatenate([zeros.values, -zeros.values[kinds == "quadruple"].conj()])
+        distance = np.abs(zeros.values[chosen, None] - every)
+        distance[np.arange(len(chosen)), chosen] = np.inf
+        return cls(
+            values=zeros.values[chosen],
+            kinds=tuple(zeros.kind[index] for index in chosen),
+            gaps=distance.min(axis=1, initial=np.inf),
+        )
+
+
+def _nearest_of_members(
+    model: ReducedModel, ensemble: FloatArray, labels: Sequence[FrfLabel], found: Sequence[_Inside]
+) -> list[ComplexArray]:
+    """Zeros of each member nearest to those of the model, (m, n) of every FRF; NaN where a member has none."""
     outputs = np.array([model.row(label.output_dof) for label in labels])
     inputs = np.array([model.row(label.input_dof) for label in labels])
-    return [
-        [roots.values for roots in every_damped_zero(mass, damping, stiffness, outputs, inputs)]
-        for mass, damping, stiffness in ensemble
-    ]
+    nearest = [np.full((len(ensemble), len(inside.values)), complex(np.nan, np.nan)) for inside in found]
+    start = np.concatenate([*(inside.values for inside in found), np.zeros(0, complex)])
+    gaps = np.concatenate([*(inside.gaps for inside in found), np.zeros(0)])
+    frf = np.repeat(np.arange(len(found)), [len(inside.values) for inside in found])
+    if not len(start):
+        return nearest
+    for member, (mass, damping, stiffness) in enumerate(ensemble):
+        is_near, zeros = np.zeros(len(start), bool), start
+        if are_symmetric(mass, damping, stiffness):
+            zeros, is_found = damped_form(mass, damping, stiffness).zeros(outputs[frf], inputs[frf], start)
+            is_near = is_found & (np.abs(zeros - start) < HALFWAY * gaps)
+        # where none of an FRF has come halfway to another, each is still the nearest
+        far = np.unique(frf[~is_near])
+        for number in np.setdiff1d(frf, far).tolist():
+            nearest[number][member] = _if_same(zeros[frf == number], found[number].values)
+        every_zero = every_damped_zero(mass, damping, stiffness, outputs[far], inputs[far])
+        for number, every in zip(far.tolist(), every_zero, strict=True):
+            upper, values = every.values[every.values.imag > 0], found[number].values
+            if len(upper):
+                best = np.abs(upper[:, None] - values).argmin(axis=0)
+                nearest[number][member] = _if_same(upper[best], values)
+    return nearest
 
 
-def _spread(of_members: list[ComplexArray], values: ComplexArray) -> list[tuple[float, float, float]]:
+def _if_same(zeros: ComplexArray, values: ComplexArray) -> ComplexArray:
+    is_same = (zeros.imag > 0) & (np.abs(zeros - values) < SAME_ZERO * np.abs(values))
+    return np.where(is_same, zeros, complex(np.nan, np.nan))
+
+
+def _spread(nearest: ComplexArray, values: ComplexArray) -> list[tuple[float, float, float]]:
     """Give standard deviations of real and imaginary parts, and the part of the members that have the zero."""
-    if not len(of_members) or not len(values):
+    if not len(nearest) or not len(values):
         return [(np.nan, np.nan, np.nan)] * len(values)
-    nearest = np.full((len(of_members), len(values)), complex(np.nan, np.nan))
-    for member, zeros in enumerate(of_members):
-        roots = zeros[zeros.imag > 0]
-        distance = np.abs(roots[:, None] - values) / np.abs(values)
-        best = distance.argmin(axis=0)
-        is_same = distance[best, np.arange(len(values))] < SAME_ZERO
-        nearest[member, is_same] = roots[best[is_same]]
     result = []
     for column, value in zip(nearest.T, values, strict=True):
         deviation = column[~np.isnan(column)] - value
@@ -102,7 +143,7 @@ def _spread(of_members: list[ComplexArray], values: ComplexArray) -> list[tuple[
             float(np.median(np.abs(part))) / GAUSSIAN if len(deviation) else np.nan
             for part in (deviation.real, deviation.imag)
         )
-        result.append((real, imag, len(deviation) / len(of_members)))
+        result.append((real, imag, len(deviation) / len(nearest)))
     return result
 
 
