@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import numpy as np
 
@@ -103,7 +103,19 @@ class Cause:
 
 
 NO_MISTAKE = Cause(says="", file="", line_or_key="")
-FindCauses: TypeAlias = Callable[[Situation], Iterable[Cause]]
+
+
+class Causes(Protocol):
+    """Causes of a kind; where there are very many, each is written out when it is asked for."""
+
+    def __len__(self) -> int:
+        """Count them."""
+
+    def __getitem__(self, number: int, /) -> Cause:
+        """Give one."""
+
+
+FindCauses: TypeAlias = Callable[[Situation], "Iterable[Cause] | Causes"]
 
 
 def log_evidence(cause: Cause, situation: Situation) -> float:

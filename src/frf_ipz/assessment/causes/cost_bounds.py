@@ -1,24 +1,25 @@
 """How likely a mistake can be at most, for next to nothing: of thousands of places of a sensor few need a closer look.
 
-A mistake that moves one sensor changes the FRFs of that sensor alone. The costs of all others are those of the model as
-it stands, and are summed once. What is left out is what the assignment of modes costs beside the best of each.
+A mistake that moves a sensor changes the FRFs of that sensor alone. The costs of all others are those of the model as
+it stands, and are summed once. Of other mistakes, most do not even bring the frequencies near. What is left out is what
+the assignment of modes costs beside the best of each.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.assessment.causes.modal_comparison import cost_of_frequency, cost_of_products, costs_of_absence
+from frf_ipz.assessment.causes.places import ExchangedSensors, MisplacedSensors
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.assessment.causes.cause import Cause, Situation
+    from frf_ipz.assessment.causes.cause import Cause, Causes, Situation
     from frf_ipz.dofs import AnyDof
 
 PLACES_AT_ONCE = 256
@@ -53,52 +54,80 @@ class CostBounds:
     outputs: tuple[AnyDof, ...]
     inputs: tuple[AnyDof, ...]
 
-    def largest_logs(self, causes: Sequence[Cause]) -> FloatArray:
+    def largest_logs(self, causes: Causes, *, least: float = -np.inf) -> FloatArray:
         """Give what `log_evidence` of each cause is at most.
 
         Parameters
         ----------
-        causes : sequence of Cause
-            The causes.
+        causes : Causes
+            Of one kind.
+        least : float
+            What is below it does not matter, and may be said to be minus infinity.
 
         Returns
         -------
         (n_causes,) array
-            Infinity for one that changes more than where one sensor sits.
+            By the FRFs of the sensors that are moved, and by the frequencies alone for other kinds.
         """
-        logs = np.full(len(causes), np.inf)
-        places: dict[AnyDof, list[int]] = defaultdict(list)
-        for number, cause in enumerate(causes):
-            if _moves_sensors_only(cause) and len(cause.moved_outputs) == 1 and np.all(cause.gain == 1):
-                places[next(iter(cause.moved_outputs))].append(number)
-            elif _moves_sensors_only(cause) and len(cause.moved_outputs) == 2:
-                logs[number] = self._exchanged(cause)
-        for sensor, numbers in places.items():
-            for first in range(0, len(numbers), PLACES_AT_ONCE):
-                some = numbers[first : first + PLACES_AT_ONCE]
-                moved = [causes[number].moved_outputs[sensor] for number in some]
-                frfs = self._frfs_of(sensor)
-                kept = self.whole - self.by_frf[:, frfs].sum(axis=1)
-                logs[some] = -self._least(kept + self._costs_at(moved, frfs))
-        return np.asarray(logs + np.array([cause.log_prior for cause in causes]))
+        prior = -float(np.log(max(len(causes), 1)))
+        if isinstance(causes, MisplacedSensors):
+            moves = zip(causes.sensors, causes.places, strict=False)
+            logs = [self._misplaced(sensor, nodes, least - prior) for sensor, nodes in moves]
+            return np.concatenate([*logs, np.zeros(0)]) + prior
+        if isinstance(causes, ExchangedSensors):
+            return self._exchanged(causes, least - prior) + prior
+        every = [causes[number] for number in range(len(causes))]
+        return np.array([self._by_frequencies(cause) + cause.log_prior for cause in every])
 
-    def _exchanged(self, cause: Cause) -> float:
-        costs = self.whole[None].copy()
-        for sensor, place in cause.moved_outputs.items():
-            frfs = self._frfs_of(sensor)
-            gain = cause.gain[frfs] if isinstance(cause.gain, np.ndarray) else cause.gain
-            costs += self._costs_at([place], frfs, gain) - self.by_frf[:, frfs].sum(axis=1)
-        return -float(self._least(costs)[0])
+    def _by_frequencies(self, cause: Cause) -> float:
+        """Give what is left where all products of shapes agree."""
+        computed = cause.computed or self.situation.computed
+        hertz = computed.frequency_hz * cause.frequency_factor
+        near, costs = cost_of_frequency(self.situation.measured.frequency_hz, hertz)
+        best = np.where(near, costs, np.inf).min(axis=1, initial=np.inf)
+        return -float(np.minimum(best, self.alone).sum())
+
+    def _misplaced(self, sensor: AnyDof, places: Sequence[AnyDof], least: float) -> FloatArray:
+        frfs = self._frfs_of(sensor)
+        kept = self.whole - self.by_frf[:, frfs].sum(axis=1)
+        logs = np.full(len(places), -np.inf)
+        if -self._least(kept[None])[0] < least:  # wherever it is
+            return logs
+        for first in range(0, len(places), PLACES_AT_ONCE):
+            some = slice(first, first + PLACES_AT_ONCE)
+            logs[some] = -self._least(kept + self._costs_at(places[some], frfs))
+        return logs
+
+    def _exchanged(self, causes: ExchangedSensors, least: float) -> FloatArray:
+        sensors, signs = causes.sensors, causes.signs
+        frfs = [self._frfs_of(sensor) for sensor in sensors]
+        own = np.array([self.by_frf[:, some].sum(axis=1) for some in frfs]).reshape(len(sensors), len(self.whole))
+        logs = np.full(len(causes), -np.inf)
+        for start in range(0, len(causes), PLACES_AT_ONCE):
+            some = slice(start, start + PLACES_AT_ONCE)
+            logs[some] = -self._least(self.whole - own[causes.first[some]] - own[causes.second[some]])
+        open_ones = np.flatnonzero(logs >= least)
+        logs[logs < least] = -np.inf
+        costs = np.tile(self.whole, (len(open_ones), 1))
+        ends = causes.first[open_ones], causes.second[open_ones]
+        for here, there in (ends, ends[::-1]):
+            for number in np.unique(here).tolist():
+                mine = np.flatnonzero(here == number)
+                others = there[mine]
+                gain = signs[number] * signs[others][:, None, None]
+                costs[mine] += self._costs_at([sensors[other] for other in others], frfs[number], gain) - own[number]
+        logs[open_ones] = -self._least(costs)
+        return logs
 
     def _frfs_of(self, sensor: AnyDof) -> IntArray:
         return np.array([number for number, dof in enumerate(self.outputs) if dof == sensor], np.int64)
 
-    def _costs_at(self, places: Sequence[AnyDof], frfs: IntArray, gain: complex | ComplexArray = 1.0) -> FloatArray:
+    def _costs_at(self, places: Sequence[AnyDof], frfs: IntArray, gain: float | FloatArray = 1.0) -> FloatArray:
         """Costs of some FRFs where their sensor sits elsewhere, (n_places, n_pairs)."""
         shapes = self.situation.computed.shapes
         at_inputs = np.stack([shapes[self.inputs[frf]] for frf in frfs.tolist()], axis=1)
         at_places = np.stack([shapes[place] for place in places])[:, self.columns, None]
-        products = np.asarray(at_places * at_inputs[self.columns] * gain, np.complex128)
+        products = at_places * at_inputs[self.columns] * gain
         measured = self.situation.measured
         return np.asarray(
             cost_of_products(
@@ -149,7 +178,3 @@ def bound_costs(situation: Situation) -> CostBounds:
         outputs=tuple(label.output_dof.unsigned for label in measured.labels),
         inputs=tuple(label.input_dof.unsigned for label in measured.labels),
     )
-
-
-def _moves_sensors_only(cause: Cause) -> bool:
-    return cause.computed is None and cause.frequency_factor == 1 and not cause.power and not cause.moved_inputs

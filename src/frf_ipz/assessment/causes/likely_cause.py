@@ -8,7 +8,7 @@ of the model with that in it. A new kind is one more function in `KINDS`.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from scipy.special import logsumexp
@@ -18,10 +18,12 @@ from frf_ipz.assessment.causes import gains, materials, places, supports
 from frf_ipz.assessment.causes.cause import NO_MISTAKE, Cause, Situation, explains, log_evidence
 from frf_ipz.assessment.causes.cost_bounds import bound_costs
 from frf_ipz.assessment.causes.modal_comparison import unrelated_log_likelihood
+from frf_ipz.assessment.causes.places import ExchangedSensors, MisplacedSensors
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import FloatArray
-    from frf_ipz.assessment.causes.cause import FindCauses
+    from collections.abc import Iterable
+
+    from frf_ipz.assessment.causes.cause import Causes, FindCauses
     from frf_ipz.assessment.causes.modal_comparison import ComputedModes
 
 KINDS: tuple[FindCauses, ...] = (
@@ -60,28 +62,41 @@ def find_likely_cause(situation: Situation, explained: ComputedModes | None = No
     """
     if not len(situation.measured.frequency_hz) or not len(situation.computed.frequency_hz):
         return None
-    causes = [cause for kind in KINDS for cause in kind(situation)]
     nothing = log_evidence(NO_MISTAKE, situation)
     others = [nothing, unrelated_log_likelihood(situation.measured)]
     if explained is not None:
         others.append(log_evidence(replace(NO_MISTAKE, computed=explained), situation))
-    logs = np.array([*others, *_log_evidences(causes, situation, max(others))])
+    causes, of_causes = _log_evidences(situation, max(others))
+    if not causes:
+        return None
+    logs = np.array([*others, *of_causes])
     probability = np.exp(logs - logsumexp(logs))[len(others) :]
     if probability.sum() <= MORE_LIKELY_THAN_NOT or not explains(causes[int(np.argmax(probability))], situation):
         return None
     return _worded(causes, probability)
 
 
-def _log_evidences(causes: list[Cause], situation: Situation, best: float) -> FloatArray:
-    """Log evidence of each cause; minus infinity for one that cannot matter beside the best."""
-    largest = bound_costs(situation).largest_logs(causes)
-    logs = np.full(len(causes), -np.inf)
-    for number in np.argsort(-largest, kind="stable").tolist():
-        if largest[number] < best - NEGLIGIBLE:
+def _log_evidences(situation: Situation, best: float) -> tuple[list[Cause], list[float]]:
+    """Give the causes that may matter beside the best, and the log evidence of each."""
+    kinds = [_listed(kind(situation)) for kind in KINDS]
+    bounds = bound_costs(situation)
+    largest = [bounds.largest_logs(causes, least=best - NEGLIGIBLE) for causes in kinds]
+    whose = np.repeat(np.arange(len(kinds)), [len(causes) for causes in kinds])
+    number = np.concatenate([np.arange(len(causes)) for causes in kinds])
+    largest_logs = np.concatenate(largest)
+    found: list[Cause] = []
+    logs: list[float] = []
+    for place in np.argsort(-largest_logs, kind="stable").tolist():
+        if largest_logs[place] < best - NEGLIGIBLE:
             break
-        logs[number] = log_evidence(causes[number], situation)
-        best = max(best, float(logs[number]))
-    return logs
+        found.append(kinds[whose[place]][int(number[place])])
+        logs.append(log_evidence(found[-1], situation))
+        best = max(best, logs[-1])
+    return found, logs
+
+
+def _listed(causes: Iterable[Cause] | Causes) -> Causes:
+    return causes if isinstance(causes, (ExchangedSensors, MisplacedSensors)) else list(cast("Iterable[Cause]", causes))
 
 
 def agrees(situation: Situation) -> bool:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -14,11 +16,48 @@ from frf_ipz.dofs import AnyDof, Dof, node_dofs
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frf_ipz.arrays import ComplexArray
+    from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
     from frf_ipz.assessment.causes.cause import Situation
 
 
-def exchanged_sensors(situation: Situation) -> Iterator[Cause]:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ExchangedSensors:
+    """All pairs of sensors that may be exchanged.
+
+    Parameters
+    ----------
+    situation : Situation
+        Measurement and model.
+    sensors : tuple of Dof
+        Unsigned.
+    first, second : (n,) int array
+        The two sensors of each pair.
+    signs : (n_sensors,) array
+        Of the DOFs of the sensors, as they are written.
+    """
+
+    situation: Situation
+    sensors: tuple[AnyDof, ...]
+    first: IntArray
+    second: IntArray
+    signs: FloatArray
+
+    def __len__(self) -> int:
+        """Count the pairs."""
+        return len(self.first)
+
+    def __getitem__(self, number: int, /) -> Cause:
+        """Give a pair as a cause."""
+        first, second = self.sensors[self.first[number]], self.sensors[self.second[number]]
+        keys = [self.situation.key_of("output", _channel(self.situation, dof), "dof") for dof in (first, second)]
+        written = [label.output_dof for label in self.situation.measured.labels]
+        moved = {first: second, second: first}
+        says = f"the sensors at {first.name} and {second.name} are exchanged: exchange their dofs"
+        gain = _gain_of_exchange(written, moved)
+        return _moved(self.situation, says, "; ".join(keys), moved, {}, len(self), gain=gain)
+
+
+def exchanged_sensors(situation: Situation) -> ExchangedSensors:
     """List pairs of sensors that may be exchanged.
 
     Parameters
@@ -26,20 +65,20 @@ def exchanged_sensors(situation: Situation) -> Iterator[Cause]:
     situation : Situation
         Measurement and model.
 
-    Yields
-    ------
-    Cause
-        One a pair.
+    Returns
+    -------
+    ExchangedSensors
+        One cause a pair.
     """
-    outputs = _unique(label.output_dof.unsigned for label in situation.measured.labels)
-    pairs = list(combinations(outputs, 2))
-    keys = {dof: situation.key_of("output", _channel(situation, dof), "dof") for dof in outputs}
-    written = [label.output_dof for label in situation.measured.labels]
-    for first, second in pairs:
-        says = f"the sensors at {first.name} and {second.name} are exchanged: exchange their dofs"
-        key = f"{keys[first]}; {keys[second]}"
-        moved = {first: second, second: first}
-        yield _moved(situation, says, key, moved, {}, len(pairs), gain=_gain_of_exchange(written, moved))
+    signs = {label.output_dof.unsigned: label.output_dof.sign for label in situation.measured.labels}
+    first, second = np.triu_indices(len(signs), 1)
+    return ExchangedSensors(
+        situation=situation,
+        sensors=tuple(signs),
+        first=first,
+        second=second,
+        signs=np.array(list(signs.values()), float),
+    )
 
 
 def exchanged_inputs(situation: Situation) -> Iterator[Cause]:
@@ -65,7 +104,42 @@ def exchanged_inputs(situation: Situation) -> Iterator[Cause]:
         yield _moved(situation, says, key, {}, moved, len(pairs), gain=_gain_of_exchange(written, moved))
 
 
-def misplaced_sensor(situation: Situation) -> Iterator[Cause]:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MisplacedSensors:
+    """All sensors at all nodes where they may sit instead.
+
+    Parameters
+    ----------
+    situation : Situation
+        Measurement and model.
+    sensors : tuple of Dof
+        Unsigned.
+    places : tuple of tuple of Dof
+        Where each may be.
+    ends : (n_sensors,) int array
+        Number of causes up to each sensor, with its own.
+    """
+
+    situation: Situation
+    sensors: tuple[AnyDof, ...]
+    places: tuple[tuple[AnyDof, ...], ...]
+    ends: IntArray
+
+    def __len__(self) -> int:
+        """Count the sensors with their nodes."""
+        return int(self.ends[-1]) if len(self.ends) else 0
+
+    def __getitem__(self, number: int, /) -> Cause:
+        """Give a sensor at a node as a cause."""
+        sensor = int(np.searchsorted(self.ends, number, side="right"))
+        dof, nodes = self.sensors[sensor], self.places[sensor]
+        place, channel = nodes[number - int(self.ends[sensor]) + len(nodes)], _channel(self.situation, dof)
+        says = f"the sensor of '{channel}' seems to sit near {place.name}, not at {dof.name}: correct its dof"
+        key = self.situation.key_of("output", channel, "dof")
+        return _moved(self.situation, says, key, {dof: place}, {}, len(self))
+
+
+def misplaced_sensor(situation: Situation) -> MisplacedSensors:
     """List nodes at which a sensor may sit instead.
 
     Parameters
@@ -73,22 +147,25 @@ def misplaced_sensor(situation: Situation) -> Iterator[Cause]:
     situation : Situation
         Measurement and model.
 
-    Yields
-    ------
-    Cause
-        One a sensor and node.
+    Returns
+    -------
+    MisplacedSensors
+        One cause a sensor and node; none where there is one sensor only.
     """
     outputs = _unique(label.output_dof.unsigned for label in situation.measured.labels)
-    if len(outputs) < 2:
-        return
-    places = {dof: [other for other in situation.computed.shapes if _is_along(other, dof)] for dof in outputs}
-    count = sum(map(len, places.values()))
-    for dof, nodes in places.items():
-        channel = _channel(situation, dof)
-        key = situation.key_of("output", channel, "dof")
-        for place in nodes:
-            says = f"the sensor of '{channel}' seems to sit near {place.name}, not at {dof.name}: correct its dof"
-            yield _moved(situation, says, key, {dof: place}, {}, count)
+    along: dict[str, list[AnyDof]] = defaultdict(list)
+    for place in node_dofs(tuple(situation.computed.shapes)):
+        along[place.direction].append(place)
+    places = tuple(
+        tuple(place for place in along[dof.direction] if place != dof) if isinstance(dof, Dof) else ()
+        for dof in (outputs if len(outputs) > 1 else ())
+    )
+    return MisplacedSensors(
+        situation=situation,
+        sensors=tuple(outputs),
+        places=places,
+        ends=np.cumsum([len(nodes) for nodes in places], dtype=np.int64),
+    )
 
 
 def mirrored(situation: Situation) -> Iterator[Cause]:
@@ -162,8 +239,3 @@ def _channel(situation: Situation, dof: AnyDof) -> str:
     """Name the channel of a sensor."""
     label = next(label for label in situation.measured.labels if label.output_dof.unsigned == dof)
     return label.output_channel or str(label.output_dof)
-
-
-def _is_along(place: AnyDof, dof: AnyDof) -> bool:
-    are_nodes = isinstance(place, Dof) and isinstance(dof, Dof)
-    return are_nodes and place != dof and place.direction == dof.direction
