@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import gc
 import importlib
 import logging
-import sys
-import traceback
 import warnings
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -58,26 +55,11 @@ def errors_of_reader(path: Path, kind: str, *, losses: Sequence[str] = ()) -> It
     except MemoryError:
         raise FileFormatError(path, f"does not fit into memory as {kind}; export less") from None
     except Exception as error:  # a library raises anything on damaged bytes
-        _drop_objects(error)
         raise _damaged(path, kind, str(error) or type(error).__name__) from None
     for level, text in [*heard, *((logging.WARNING, str(warning.message)) for warning in warned)]:
         if level >= logging.ERROR or any(loss in text for loss in losses):
             raise _damaged(path, kind, text)
     said += dict.fromkeys(_in_one_line(text) for _, text in heard)
-
-
-def _drop_objects(error: Exception) -> None:
-    """Let go of half-made objects: closing themselves, they may fail too, which Python would print."""
-    hook = sys.unraisablehook
-    sys.unraisablehook = lambda _: None
-    cause: BaseException | None = error
-    try:
-        while cause is not None:
-            traceback.clear_frames(cause.__traceback__)
-            cause = cause.__context__
-        gc.collect()
-    finally:
-        sys.unraisablehook = hook
 
 
 def _damaged(path: Path, kind: str, text: str) -> FileFormatError:

@@ -163,3 +163,20 @@ def test_forces_may_act_elsewhere_in_another_record(tmp_path):
     test = TEST.replace(RECORD, RECORD + 'input_dofs = { "shaker 1" = "15:+z" }\n')
     got = frf_ipz.estimate_frfs(frf_ipz.read_test(write(tmp_path, forces, responses, test=test)))
     assert {str(dof) for dof in got.frfs.input_dofs} == {"8:+z", "15:+z"}
+
+
+def test_a_bad_record_is_left_out_beside_good_ones_and_said(tmp_path):
+    forces, responses = simulate(1)
+    for number in range(2):
+        write(tmp_path, forces, responses)
+        (tmp_path / "run.csv").rename(tmp_path / f"run_{number}.csv")
+    overloaded = np.clip(responses, None, 0.5 * responses.max(axis=1, keepdims=True))
+    write(tmp_path, forces, np.vstack([overloaded[:1], responses[1:]]), test=TEST.replace("run.csv", "run*.csv"))
+    test = frf_ipz.read_test(tmp_path / "test.toml")
+    estimate = frf_ipz.estimate_frfs(test)
+    assert estimate.warnings == ("run.csv is left out: overload of acc 0",)
+    kept = frf_ipz.estimate_frfs(test, options=frf_ipz.IngestOptions(keep=("run.csv",)))
+    assert not kept.warnings
+    assert len(kept.frfs.frequency_hz) != len(estimate.frfs.frequency_hz)  # three records allow other parts
+    alone = frf_ipz.estimate_frfs(test, options=frf_ipz.IngestOptions(drop=("run_0.csv", "run_1.csv")))
+    assert alone.warnings == ("run.csv is used although it is bad (overload of acc 0): there is no better record",)

@@ -23,6 +23,8 @@ from frf_ipz.ingest.frf_estimate import FrfEstimate
 from frf_ipz.ingest.recording_files import UNIFORM, RecordingFiles
 from frf_ipz.ingest.signals.transients import transform_subrecords
 from frf_ipz.ingest.signals.windows import count_independent_segments, cut_segments
+from frf_ipz.ingest.survey.checks import find_record_faults
+from frf_ipz.ingest.survey.selection import check_names, is_named, record_name
 from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
@@ -157,7 +159,10 @@ def estimate_random_several(test: VibrationTest, options: IngestOptions, progres
     names = [channel.column for channel in test.input_channels]
     frfs: dict[FrfLabel, tuple[np.ndarray, ...]] = {}
     tables, notes = [], []
-    signals = {setup: _read(files, setup) for setup in test.setups}
+    all_names = [record_name(test, path, 1, 1) for _, path in test.recordings]
+    check_names(all_names, options)
+    warnings: list[str] = []
+    signals = {setup: _read(files, setup, options, warnings) for setup in test.setups}
     step_s = _common_step([step for records in signals.values() for step, _ in records], test)
     length = _segment_length(test, [[part for _, part in records] for records in signals.values()], step_s, options)
     kind, how = ("sub-records", "transients at both ends removed (local rational method)")
@@ -193,20 +198,42 @@ def estimate_random_several(test: VibrationTest, options: IngestOptions, progres
             unknown_scale=test.unknown_scale,
         ),
         records=empty_record_table(),
-        choices=(f"{kind} of {length * step_s:.4g} s, {how}", *dict.fromkeys(notes)),
+        choices=(*files.notes, f"{kind} of {length * step_s:.4g} s, {how}", *dict.fromkeys(notes)),
+        warnings=tuple(warnings),
         coherences=pd.concat(tables, ignore_index=True),
     )
 
 
-def _read(files: RecordingFiles, setup: TestSetup) -> list[tuple[float, FloatArray]]:
-    """Read step and signals of each record of a set-up, (n_channels, n_samples), without their means."""
-    records = []
+def _read(
+    files: RecordingFiles, setup: TestSetup, options: IngestOptions, warnings: list[str]
+) -> list[tuple[float, FloatArray]]:
+    """Read step and signals of each good record of a set-up, (n_channels, n_samples), without their means.
+
+    A record with a fault is left out beside good ones, unless the user keeps it; where all are bad, all are used. What
+    is done is added to `warnings`.
+    """
+    good, bad, texts = [], [], []
     for path in setup.files:
+        name = record_name(files.test, path, 1, 1)
+        if is_named(name, options.drop):
+            continue
         table = np.concatenate(list(files.blocks(setup, path)))
         signals = table[:, 1:].T
         step_s = float(table[-1, 0] - table[0, 0]) / (len(table) - 1)
-        records.append((step_s, signals - signals.mean(axis=1, keepdims=True)))
-    return records
+        record = (step_s, signals - signals.mean(axis=1, keepdims=True))
+        faults = () if is_named(name, options.keep) else find_record_faults(files.test, step_s, signals)
+        if faults:
+            bad.append(record)
+            texts.append((name, "; ".join(faults)))
+        else:
+            good.append(record)
+    if not good and not bad:
+        raise InputError(f"[ingest] drop leaves no record at {', '.join(map(str, setup.input_dofs))}; keep one")
+    if good:
+        warnings += [f"{name} is left out: {text}" for name, text in texts]
+    else:
+        warnings += [f"{name} is used although it is bad ({text}): there is no better record" for name, text in texts]
+    return good or bad
 
 
 def _transform(

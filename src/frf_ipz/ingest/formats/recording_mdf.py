@@ -6,8 +6,12 @@ such a channel cannot be read, and the others can.
 
 from __future__ import annotations
 
+import gc
 import io
+import sys
+import traceback
 from collections import Counter
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +22,7 @@ from frf_ipz.ingest.formats.signal_table import Signal, SignalFormat, SignalTabl
 from frf_ipz.input_files import read_bytes, require_expanded
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from frf_ipz.ingest.formats.recording import TableKeys
@@ -38,7 +43,11 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
     data = read_bytes(path)
     signals: list[Signal] = []
     unread: dict[str, str] = {}
-    with errors_of_reader(path, KIND, losses=LOSSES) as said, asammdf.MDF(io.BytesIO(data)) as content:
+    with (
+        errors_of_reader(path, KIND, losses=LOSSES) as said,
+        _dropping_half_made_files(),
+        asammdf.MDF(io.BytesIO(data)) as content,
+    ):
         linear = LINEAR.get(content.version[0], set())
         sizes = [group.channel_group.cycles_nr * 8 * len(group.channels) for group in content.groups]
         require_expanded(path, sum(sizes), file_bytes=len(data), most_bytes=MOST_EXPANDED)
@@ -68,6 +77,25 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
 
 
 FORMAT = SignalFormat(rank=10, recognises=_recognises, read=_read)
+
+
+@contextmanager
+def _dropping_half_made_files() -> Iterator[None]:
+    """Let go of what a damaged file was to become: closing itself, it fails once more, which Python would print."""
+    try:
+        yield
+    except Exception as error:
+        cause: BaseException | None = error
+        hook = sys.unraisablehook
+        sys.unraisablehook = lambda _: None
+        try:
+            while cause is not None:
+                traceback.clear_frames(cause.__traceback__)
+                cause = cause.__context__
+            gc.collect()  # it refers to itself
+        finally:
+            sys.unraisablehook = hook
+        raise
 
 
 def _physical(signal: Any, linear: set[int]) -> Any:  # noqa: ANN401 - as asammdf has them

@@ -169,6 +169,35 @@ def check_record(
     )
 
 
+def find_record_faults(test: VibrationTest, step_s: float, signals: FloatArray) -> tuple[str, ...]:
+    """Find what is wrong with a record of several forces at once, as in one with a single force.
+
+    Parameters
+    ----------
+    test : VibrationTest
+        Its channels.
+    step_s : float
+        Time step, s.
+    signals : (n_inputs + n_outputs, n_samples) array
+        Forces, then responses, SI.
+
+    Returns
+    -------
+    tuple of str
+        Overload, dropout and dead channels; empty where there is none.
+    """
+    n_inputs = len(test.input_channels)
+    faults: list[str] = []
+    for channel, force in zip(test.input_channels, signals[:n_inputs], strict=True):
+        once = force[-find_period(np.abs(force)) :]
+        if not np.ptp(force):
+            faults.append(f"{channel.column} is dead: all its samples are {force[0]:.4g}")
+        elif is_clipped(once):
+            faults.append(f"clipping of {channel.column}")
+    once = slice(-find_period(np.abs(signals[0])), None)
+    return (*faults, *(text for _, text in _find_bad_channels(test, step_s, signals[n_inputs:, once], 0)))
+
+
 def _find_double_hit(pulse: Pulse, step_s: float) -> tuple[str, ...]:
     if not pulse.bumps.size:
         return ()
