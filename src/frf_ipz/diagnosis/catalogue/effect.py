@@ -10,7 +10,6 @@ report) follows from that. A class in a user's own file does the same::
 
     class Sloshing(Effect):
         name = "sloshing"
-        imitators = ("attached_resonator", "added_mass")
 
         def locations(self, context):
             return list_node_locations(context)
@@ -171,9 +170,6 @@ class Effect(ABC):
 
     name: ClassVar[str]
     """As in `diagnosis.json`."""
-    imitators: ClassVar[tuple[str, ...]] = ()
-    """Effects that are hard to distinguish from it, the most alike first."""
-
     has_dynamics: ClassVar[bool] = False
     """Something with dynamics of its own hangs at a location: two of that kind at one location imitate many things."""
 

@@ -34,7 +34,6 @@ class MassLoss(Effect):
     """A point mass that is gone from a node."""
 
     name = "mass_loss"
-    imitators = ("local_stiffness", "added_mass")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that has something to lose."""

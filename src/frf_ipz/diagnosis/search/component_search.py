@@ -16,7 +16,6 @@ from frf_ipz.diagnosis.search.neighbourhood_search import (
     MAX_BEHIND,
     N_EFFECTS,
     Fits,
-    are_imitators,
     find_cost_limit,
     refine_surroundings,
     search_neighbourhoods,
@@ -261,7 +260,7 @@ def _fit_starts(problem: InferenceProblem, base: Fit, refined: Sequence[Start], 
         if fit.cost < COST_RATIO * rough_fits[0].cost + COST_SLACK:
             keep_better(fits, problem.fit_exactly(fit, cost_limit=find_cost_limit(fits.values())))
     if not rough_fits[0].is_far_off:
-        _fit_imitators(problem, rough_fits, fits)
+        _fit_other_effects(problem, rough_fits, fits)
 
 
 def _add_beside_nuisance(problem: InferenceProblem, base: Fit, fits: Fits) -> None:
@@ -294,13 +293,12 @@ def count_exact_fits(rough_fits: Sequence[Fit], usual: int) -> int:
     return N_EXACT_FAR_OFF if rough_fits and rough_fits[0].is_far_off else usual
 
 
-def _fit_imitators(problem: InferenceProblem, rough_fits: Sequence[Fit], fits: Fits) -> None:
-    """Fit imitators of the best: far behind at first, they may yet be as good."""
-    best = max(fits.values(), key=lambda fit: fit.log_evidence).hypothesis.components[-1].effect
+def _fit_other_effects(problem: InferenceProblem, rough_fits: Sequence[Fit], fits: Fits) -> None:
+    """Fit each effect that has no fit yet, until it cannot imitate the best: far behind at first, it may be as good."""
     fitted = {fit.hypothesis.components[-1].effect.name for fit in fits.values()}
     for fit in sorted(rough_fits, key=lambda fit: fit.cost):
         effect = fit.hypothesis.components[-1].effect
-        if are_imitators(effect, best) and effect.name not in fitted:
+        if effect.name not in fitted:
             fitted.add(effect.name)
             keep_better(fits, problem.fit_exactly(fit, cost_limit=find_cost_limit(fits.values())))
 

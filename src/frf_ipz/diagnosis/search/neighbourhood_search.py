@@ -16,7 +16,6 @@ from frf_ipz.diagnosis.search.robust_refinement import REFINED_ERROR, refine
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.evidence.hypothesis import Component, ComponentKey, Hypothesis
     from frf_ipz.diagnosis.location import Location
 
@@ -88,7 +87,7 @@ def _add_imitators(problem: InferenceProblem, base: Fit, best: Fit, fits: Fits) 
 
 
 def list_imitators(problem: InferenceProblem, fit: Fit) -> list[Component]:
-    """List imitators of the last component of a fit, at its location or at one end of it.
+    """List what may imitate the last component of a fit: all other effects at its location or at one end of it.
 
     Parameters
     ----------
@@ -103,7 +102,7 @@ def list_imitators(problem: InferenceProblem, fit: Fit) -> list[Component]:
         Of other effects.
     """
     component = fit.hypothesis.components[-1]
-    effects = [effect for effect in problem.effects.values() if are_imitators(effect, component.effect)]
+    effects = [effect for effect in problem.effects.values() if effect.name != component.effect.name]
     return [
         imitator
         for effect in effects
@@ -116,11 +115,6 @@ def _is_within(location: Location, reference: Location) -> bool:
     """Say whether a location equals another, or is one of the two nodes that the other one joins."""
     is_end = bool(location.nodes) and set(location.nodes) < set(reference.nodes)
     return is_end or location.place == reference.place
-
-
-def are_imitators(first: Effect, second: Effect) -> bool:
-    """Say whether one effect is known to imitate another, either way round."""
-    return first.name in second.imitators or second.name in first.imitators
 
 
 def _search_neighbourhood(problem: InferenceProblem, base: Fit, fit: Fit, fits: Fits) -> None:

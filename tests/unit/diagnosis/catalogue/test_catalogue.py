@@ -33,12 +33,6 @@ def test_all_linear_effects_of_the_contract_are_shipped():
     assert set(shipped_effects()) == LINEAR
 
 
-def test_imitators_are_effects():
-    for effect in shipped_effects().values():
-        assert set(effect.imitators) <= LINEAR
-        assert effect.name not in effect.imitators
-
-
 def test_only_chosen_effects_are_looked_for():
     assert set(EffectCatalogue(options=DiagnoseOptions(effects=("added_mass",)), folder=Path()).effects()) == {
         "added_mass"

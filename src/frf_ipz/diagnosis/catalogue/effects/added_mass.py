@@ -30,7 +30,6 @@ class AddedMass(Effect):
     """A point mass at a node."""
 
     name = "added_mass"
-    imitators = ("local_stiffness", "attached_resonator", "boundary_compliance")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that moves."""

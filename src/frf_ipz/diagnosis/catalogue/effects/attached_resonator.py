@@ -38,7 +38,6 @@ class AttachedResonator(Effect):
     """A mass on a spring and a damper at a node."""
 
     name = "attached_resonator"
-    imitators = ("added_mass", "local_damper", "grounded_spring", "viscoelastic_joint")
     has_dynamics = True
 
     def locations(self, context: ModelContext) -> Sequence[Location]:

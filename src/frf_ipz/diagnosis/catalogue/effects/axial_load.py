@@ -28,7 +28,6 @@ class AxialLoad(Effect):
     """An axial force that is the same all along."""
 
     name = "axial_load"
-    imitators = ("grounded_spring", "global_stiffness", "boundary_compliance", "shear_rotary_inertia")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Return a beam that is held at both ends."""

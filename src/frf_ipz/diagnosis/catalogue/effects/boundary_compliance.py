@@ -30,7 +30,6 @@ class BoundaryCompliance(Effect):
     """The motion that the support of an end blocks is held by a spring instead."""
 
     name = "boundary_compliance"
-    imitators = ("local_stiffness", "added_mass", "axial_load")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Each supported end of a beam: its rotation, its translation, or both."""

@@ -30,7 +30,6 @@ class CouplingSpring(Effect):
     """A spring between two nodes."""
 
     name = "coupling_spring"
-    imitators = ("grounded_spring", "local_stiffness", "axial_load")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """All pairs of nodes that are apart and not joined by a spring already."""

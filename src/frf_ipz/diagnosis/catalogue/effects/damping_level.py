@@ -26,7 +26,6 @@ class DampingLevel(Effect):
     """The ratio of all modes."""
 
     name = "damping_level"
-    imitators = ("structural_damping", "local_damper")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Everywhere."""

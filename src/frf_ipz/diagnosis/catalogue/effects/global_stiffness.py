@@ -24,7 +24,6 @@ class GlobalStiffness(Effect):
     """All stiffness times a ratio."""
 
     name = "global_stiffness"
-    imitators = ("viscoelastic_joint", "axial_load", "shear_rotary_inertia")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Everywhere."""

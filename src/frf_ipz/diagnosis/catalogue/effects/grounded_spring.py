@@ -32,7 +32,6 @@ class GroundedSpring(Effect):
     """A spring between a node and the ground."""
 
     name = "grounded_spring"
-    imitators = ("coupling_spring", "axial_load", "viscoelastic_joint", "boundary_compliance")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every node that moves; not where a lumped model has such a spring already, which is then stiffer."""

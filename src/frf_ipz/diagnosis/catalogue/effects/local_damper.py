@@ -30,7 +30,6 @@ class LocalDamper(Effect):
     """A viscous damper between a node and the ground."""
 
     name = "local_damper"
-    imitators = ("attached_resonator", "viscoelastic_joint", "damping_level")
     has_dynamics = True
 
     def locations(self, context: ModelContext) -> Sequence[Location]:

@@ -33,7 +33,6 @@ class LocalStiffness(Effect):
     """Segments of elements, springs or groups; masses stay."""
 
     name = "local_stiffness"
-    imitators = ("boundary_compliance", "added_mass", "coupling_spring")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Segments of some lengths; every spring; every group."""

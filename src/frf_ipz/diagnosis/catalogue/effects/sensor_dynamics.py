@@ -25,7 +25,6 @@ class SensorDynamics(Effect):
     """A first-order filter in a channel."""
 
     name = "sensor_dynamics"
-    imitators = ("time_delay", "sensor_gain")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every channel, with a high-pass or a low-pass."""

@@ -26,7 +26,6 @@ class SensorGain(Effect):
     """The recorded channel is the true signal times a ratio."""
 
     name = "sensor_gain"
-    imitators = ("global_stiffness",)
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every channel, with either sign."""

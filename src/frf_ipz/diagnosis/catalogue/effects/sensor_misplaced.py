@@ -21,7 +21,6 @@ class SensorMisplaced(Effect):
     """The channel is that of another node, or of another axis of a triaxial sensor."""
 
     name = "sensor_misplaced"
-    imitators = ("sensor_gain",)
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every other node, and every other axis, for every channel that stays at one node; a port has none."""

@@ -22,7 +22,6 @@ class ShearRotaryInertia(Effect):
     """Timoshenko instead of Euler-Bernoulli."""
 
     name = "shear_rotary_inertia"
-    imitators = ("global_stiffness", "axial_load", "added_mass")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Return a beam that was modelled by Euler-Bernoulli."""

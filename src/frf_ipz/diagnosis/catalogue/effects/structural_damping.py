@@ -32,7 +32,6 @@ class StructuralDamping(Effect):
     """K (1 + i eta) besides the modal damping."""
 
     name = "structural_damping"
-    imitators = ("damping_level", "viscoelastic_joint", "local_damper")
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Everywhere, in four forms."""

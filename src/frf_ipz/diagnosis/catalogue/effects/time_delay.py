@@ -24,7 +24,6 @@ class TimeDelay(Effect):
     """A channel is late, or all sensors together: what a controller, a recorder or a network adds."""
 
     name = "time_delay"
-    imitators = ("sensor_dynamics",)
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
         """Every channel, and all sensors together."""

@@ -35,7 +35,6 @@ class ViscoelasticJoint(Effect):
     """A spring and a damper in series, beside the model: at a node, across a spring, at a pinned end."""
 
     name = "viscoelastic_joint"
-    imitators = ("local_damper", "grounded_spring", "attached_resonator", "global_stiffness")
     has_dynamics = True
 
     def locations(self, context: ModelContext) -> Sequence[Location]:
