@@ -20,6 +20,7 @@ from frf_ipz.diagnosis.evidence.inference_problem import make_data, pose_problem
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.measured.group_spectra import group_records
+from frf_ipz.diagnosis.measured.levels import MIN_RECORDS
 from frf_ipz.diagnosis.measured.preprocessing.dc_offset import remove_dc_offset
 from frf_ipz.diagnosis.measured.preprocessing.hum import remove_hum
 from frf_ipz.diagnosis.measured.preprocessing.noise_levels import measure_noise_levels
@@ -78,7 +79,6 @@ if TYPE_CHECKING:
     from frf_ipz.progress import Progress
 
 CLEARLY_NONLINEAR = 4.0  # times the limit of linearity: below, a linear explanation that leaves nothing comes first
-MIN_RECORDS = 2  # at one excited point, to compare levels
 AMBIGUOUS = 5.0  # log Bayes factor: effects nearer to the best than that are not distinguished
 MAX_ALTERNATIVES = 6
 # What was not looked at, where the time was over before that step was done

@@ -120,6 +120,8 @@ class Estimate:
 
 
 NORMAL_95 = 1.96  # standard deviations
+LISTED_PROBABILITY = 0.95  # probability that the listed locations hold
+MAX_LOCATIONS = 12  # that are listed
 MOST_DIGITS = 6  # of a number whose deviation is tiny
 FEWEST_DIGITS = 4  # of a number whose deviation is not known
 

@@ -14,6 +14,7 @@ from frf_ipz.diagnosis.compare.unexplained_change import UnexplainedPart, discou
 from frf_ipz.diagnosis.evidence.inference_problem import make_data, pose_problem
 from frf_ipz.diagnosis.evidence.map_fit import fit_map
 from frf_ipz.diagnosis.measured.data_split import DataSplit, split_data
+from frf_ipz.diagnosis.model.nuisance import UNIFORM_STD
 from frf_ipz.diagnosis.search.component_search import fit_null_model
 from frf_ipz.diagnosis.verdict.goodness import assess_goodness
 from frf_ipz.errors import InputError
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.options import DiagnoseOptions
     from frf_ipz.structure import StructuralModel
 
-HALF_WIDTH = np.sqrt(3.0)  # tolerances are half widths: the standard deviation of what is uniform times that
 ENOUGH_REPEATS = 3  # states: fewer show no scatter
 ENOUGH_STATES = 0.9  # of the states before that must be explained by what was learnt
 ENOUGH_FOR_MEDIANS = 10  # states
@@ -295,7 +295,7 @@ def _estimate_scatter(fits: Sequence[Fit], stated: DiagnoseOptions) -> DiagnoseO
     inside = _mask_modes_in_band(fits[0].hypothesis)
     damping = np.array([np.log1p(nuisance.damping)[elastic][inside] for nuisance in nuisance_values])
     gains = np.array([nuisance.gains for nuisance in nuisance_values])
-    wider = HALF_WIDTH * np.sqrt(1 + 1 / n)  # the mean that they are compared with is not exact either
+    wider = np.sqrt(1 + 1 / n) / UNIFORM_STD  # the mean that they are compared with is not exact either
     return replace(
         stated,
         frequency_tolerance=max(stated.frequency_tolerance, wider * _std_over_states(frequency)),

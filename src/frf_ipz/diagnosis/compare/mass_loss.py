@@ -16,6 +16,7 @@ from frf_ipz.diagnosis.catalogue.effect import (
     list_neighbouring_nodes,
     list_node_locations,
 )
+from frf_ipz.diagnosis.catalogue.effects.added_mass import SMALLEST
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.fe.changes import with_point_masses
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Estimate
     from frf_ipz.structure import StructuralModel
 
-SMALLEST = 1e-5  # of the mass of the structure
 MIN_MASS = 1e-3  # of the mass of the structure: nodes that have less cannot lose it
 MAX_PART = 0.999  # of what a node has: what is left still moves
 

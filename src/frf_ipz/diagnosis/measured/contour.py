@@ -16,6 +16,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 
+WINDOW_DECAYS = 8.0  # sigma times a record: 3e-4 of a mode remains at its end
 SLOPE = 0.6  # of sigma over the distance to the next resonance
 STEP = 0.9  # from point to point, over sigma
 MAX_SIGMA_RATIO = 0.02  # sigma over omega: lightly damped modes that nobody knows of are not stepped over

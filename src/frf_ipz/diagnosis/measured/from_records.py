@@ -9,7 +9,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.measured.contour import COARSE, Resonances, find_resonances
+from frf_ipz.diagnosis.measured.contour import COARSE, WINDOW_DECAYS, Resonances, find_resonances
 from frf_ipz.diagnosis.measured.forces import (
     MISSING_SAMPLES,
     Pulse,
@@ -32,7 +32,6 @@ from frf_ipz.diagnosis.measured.transfer_functions import TransferFunctions
 from frf_ipz.diagnosis.observations import Observations, ObservedRecord, transform_records
 from frf_ipz.frf import FrfLabel
 
-WINDOW_DECAYS = 8.0  # of the window within a record: 3e-4 of a mode remains at its end
 CERTAIN_PART = 0.6  # of a decay rate that was read from the width of a peak
 LEAST_PART = 0.1  # of the window's decay rate: keeps the transforms of noise finite
 UNREPEATED = 2e-3  # of the motion: noise that is assumed without repeated records

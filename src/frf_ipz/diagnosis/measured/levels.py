@@ -33,7 +33,7 @@ else:
     pd = import_late("pandas")
 
 MIN_LEVEL_RATIO = 1.5  # of the strongest to the weakest record of a group: below, there is one level only
-MIN_RECORDS = 2
+MIN_RECORDS = 2  # at one excited point, to compare levels
 MIN_LINES = 8
 FARTHEST_PEAK = 10.0  # half-widths of a mode from one level to the next: farther peaks are other modes
 DOMINANT = 0.5  # of an FRF at its peak: the part of it that a mode needs to be fitted by itself

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.diagnosis.result import Estimate, Finding, describe_location_set, with_confidence
+from frf_ipz.diagnosis.result import (
+    LISTED_PROBABILITY,
+    MAX_LOCATIONS,
+    NORMAL_95,
+    Estimate,
+    Finding,
+    describe_location_set,
+    with_confidence,
+)
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -14,11 +22,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.model.modal_model import ModalModel
 
 LOG_RANGE = np.log(1e6)  # of a law's parameters: uniform over six decades each
-NORMAL_95 = 1.96
 STD_INFLATION = 2.0  # of the fit's standard deviations: neighbouring lines share the model's errors
 MIN_STDS = 3.0  # from zero: laws that were there had 9 and more, two that explained without being there had 2
-MAX_LOCATIONS = 12
-COVERAGE = 0.95
 
 
 def log_evidence_gain(fit: LawFit, drop: float, n_locations: int, scale: float) -> float:
@@ -76,7 +81,7 @@ def make_findings(
             continue
         of_law = [i for i in order if fits[i].law is fit.law]
         share = np.cumsum(probability[of_law]) / max(probability[of_law].sum(), 1e-300)
-        covering = of_law[: min(int(np.searchsorted(share, COVERAGE)) + 1, MAX_LOCATIONS)]
+        covering = of_law[: min(int(np.searchsorted(share, LISTED_PROBABILITY)) + 1, MAX_LOCATIONS)]
         location_set = tuple(modal_model.locations[fits[i].location].place for i in covering)
         estimates = _estimate_parameters(fit, scale)
         phrase = fit.law.phrase.format(*(estimate.in_words() for estimate in estimates.values()))

@@ -18,9 +18,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.diagnosis.measured.contour import WINDOW_DECAYS
 from frf_ipz.diagnosis.measured.forces import MISSING_SAMPLES, isolate_pulse, missing_ringing
 from frf_ipz.diagnosis.measured.group_spectra import group_records
+from frf_ipz.diagnosis.measured.levels import MIN_RECORDS
 from frf_ipz.diagnosis.measured.noise_growth import MeasuredNoise
+from frf_ipz.diagnosis.measured.preprocessing.residual_motion import MODEL_ERROR
 from frf_ipz.diagnosis.nonlinear.channel_noise import ChannelNoise, read_noise
 from frf_ipz.numerics.least_squares import solve_scaled_columns
 
@@ -30,11 +33,8 @@ if TYPE_CHECKING:
 WIDTH = 24  # lines that are fitted together
 DEGREES = (0, 2), (2, 2), (3, 3)  # of the local polynomials: of the poles; of the zeros and of transients
 ROUNDS = 4  # of weights
-WINDOW_DECAYS = 8.0  # sigma times the record of an impact: its end counts for 3e-4
 LEAD = 2  # samples before the pulse
 END = 10  # part of a record at its end that shows the residual motion for the next impact in the same recording
-MODEL_ERROR = 0.003  # of the response: misfit by the local quotient, sampling and positions of impacts
-MIN_RECORDS = 2
 CUT = 1e-12  # of the largest singular value of the local polynomials
 LEAKAGE = 2.0  # lines beside its own on which a tone shows
 LIMIT_HAMMER, LIMIT_SHAKER = 5.0, 2.0  # times the expected misfit, in the worst group of lines

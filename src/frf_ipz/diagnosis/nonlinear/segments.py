@@ -17,6 +17,7 @@ from scipy.signal import resample
 from scipy.signal.windows import tukey
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from frf_ipz.diagnosis.measured.contour import WINDOW_DECAYS
 from frf_ipz.diagnosis.measured.forces import isolate_pulse
 from frf_ipz.diagnosis.nonlinear.model.modal_model import remaining_motion
 from frf_ipz.errors import InputError
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.model.modal_model import ModalModel
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
 
-WINDOW_DECAYS = 8.0  # sigma times the segment: its end counts for 3e-4
 LINE_STEP = 2  # lines are closer than the window resolves: every second one is independent enough
 EDGE = 40  # samples beside a segment that starts in motion: they are faded out
 REFINEMENT = 8  # times as many samples in time, where a segment starts with a jump

@@ -25,14 +25,13 @@ from frf_ipz.diagnosis.evidence.map_fit import adopt_modes, fit_map
 from frf_ipz.diagnosis.search.component_search import Ranking, keep_better, rank_fits
 from frf_ipz.diagnosis.search.global_scan import scan_globally
 from frf_ipz.diagnosis.search.neighbourhood_search import (
-    GAIN,
     Fits,
     find_cost_limit,
     fit_from_neighbour,
     list_imitators,
     search_neighbourhoods,
 )
-from frf_ipz.diagnosis.search.robust_refinement import REFINED_ERROR, refine, select_apart
+from frf_ipz.diagnosis.search.robust_refinement import GAIN, REFINED_ERROR, refine, select_apart
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterable

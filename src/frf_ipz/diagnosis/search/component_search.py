@@ -12,7 +12,6 @@ from frf_ipz.diagnosis.evidence.fit import Fit
 from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
 from frf_ipz.diagnosis.search.global_scan import scan_beside_nuisance, scan_globally
 from frf_ipz.diagnosis.search.neighbourhood_search import (
-    GAIN,
     MAX_BEHIND,
     N_EFFECTS,
     Fits,
@@ -20,7 +19,15 @@ from frf_ipz.diagnosis.search.neighbourhood_search import (
     refine_surroundings,
     search_neighbourhoods,
 )
-from frf_ipz.diagnosis.search.robust_refinement import Start, refine_halfway, refine_starts, select_apart
+from frf_ipz.diagnosis.search.robust_refinement import (
+    COST_RATIO,
+    GAIN,
+    LOCATIONS_PER_EFFECT,
+    Start,
+    refine_halfway,
+    refine_starts,
+    select_apart,
+)
 from frf_ipz.diagnosis.search.score_tests import run_score_test
 
 N_SCORED = 14  # hypotheses that are fitted after the score test
@@ -28,10 +35,9 @@ MIN_PROMISE = 5.0  # log-likelihood that a linear step promises: with less, a hy
 MIN_PROMISED_COST = 0.3  # of the cost of a fit far off: with less, a small effect is not what it lacks
 PROMISED_PART = 0.5  # of what a fit gains: what a linear step on fewer points must promise of it
 BROKEN_PROMISE, BROKEN_PART = 10.0, 0.5  # log-likelihood, and part of a promise: a fit that lacks more begins anew
-SCORED_PER_EFFECT = 3  # locations of an effect that are fitted after the score test
 N_ROUGH = 12  # hypotheses that are fitted with inflated errors
 N_EXACT, N_EXACT_FAR_OFF = 7, 2
-COST_RATIO, COST_SLACK = 4.0, 400.0  # times the best cost, plus: beyond, hypotheses are not fitted exactly
+COST_SLACK = 400.0  # besides a multiple of the best cost: beyond, hypotheses are not fitted exactly
 N_EFFECTS_IN_VAIN = 2  # effects whose neighbourhoods are searched where no further component explains much
 VAIN_COST_RATIO = 0.6  # of the cost of the base: a fit that leaves more does not explain it
 N_CONTINUED = 2  # fits that go on until they converge
@@ -213,7 +219,7 @@ def _most_promising(scored: Sequence[Start], min_log_bayes_factor: float) -> lis
 
     The best location of each comes first: a linear step may promise a small part of what an effect explains.
     """
-    starts = sorted(select_apart(scored, SCORED_PER_EFFECT), key=lambda start: start.cost)
+    starts = sorted(select_apart(scored, LOCATIONS_PER_EFFECT), key=lambda start: start.cost)
     firsts = {start.component.effect.name: start for start in reversed(starts)}
     starts.sort(key=lambda start: start is not firsts[start.component.effect.name])
     return [
@@ -266,7 +272,8 @@ def _fit_starts(problem: InferenceProblem, base: Fit, refined: Sequence[Start], 
 def _add_beside_nuisance(problem: InferenceProblem, base: Fit, fits: Fits) -> None:
     """Fit what stands out beside the nuisance that was fitted without it."""
     known = base.hypothesis.components
-    starts = sorted(select_apart(scan_beside_nuisance(problem, base), SCORED_PER_EFFECT), key=lambda start: start.cost)
+    scanned = select_apart(scan_beside_nuisance(problem, base), LOCATIONS_PER_EFFECT)
+    starts = sorted(scanned, key=lambda start: start.cost)
     rough_fits = [
         problem.fit_roughly((*known, start.component), np.concatenate([base.values, start.values]), base.nuisance)
         for start in starts[:N_BESIDE_NUISANCE]

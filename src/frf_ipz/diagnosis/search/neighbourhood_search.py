@@ -12,7 +12,7 @@ from frf_ipz.diagnosis.evidence.fit import Fit
 from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, compute_weights
 from frf_ipz.diagnosis.evidence.map_fit import fit_map
 from frf_ipz.diagnosis.search.global_scan import find_best_start, list_components
-from frf_ipz.diagnosis.search.robust_refinement import REFINED_ERROR, refine
+from frf_ipz.diagnosis.search.robust_refinement import COST_RATIO, GAIN, MAX_STEPS, REFINED_ERROR, refine
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -25,10 +25,7 @@ Fits: TypeAlias = "dict[ComponentKey, Fit]"
 N_EFFECTS = 6  # effects whose neighbourhoods are searched
 MAX_BEHIND = 2000.0  # log Bayes factor behind the best: an effect that is further behind is not searched any more
 MAX_BEHIND_COMPLETE = 300.0  # the same behind one that explains nearly all
-COST_RATIO = 2.0  # times the cost of one that explains nearly all: a fit on its way there may have reached that much
-UNFINISHED_COST_RATIO = 4.0  # times the best cost: a neighbour's fit that has not converged may yet fall below that
-GAIN = 0.5  # log Bayes factor: a neighbour must be better by that
-MAX_STEPS = 12
+COMPLETE_COST_RATIO = 2.0  # times the cost of one that explains nearly all: a fit on its way may have reached that much
 MAX_STARTS = 64  # start values of an imitator
 N_GLANCED, N_FITTED_AROUND = 24, 4  # locations further around that are compared by one step, and fitted
 
@@ -48,7 +45,9 @@ def find_cost_limit(fits: Iterable[Fit]) -> float:
         off, a fit may gain little for many steps before it falls to a thousandth.
     """
     best = max(fits, key=lambda fit: fit.log_evidence, default=None)
-    return COST_RATIO * best.cost + MAX_BEHIND_COMPLETE if best is not None and best.explains_nearly_all else np.inf
+    if best is None or not best.explains_nearly_all:
+        return np.inf
+    return COMPLETE_COST_RATIO * best.cost + MAX_BEHIND_COMPLETE
 
 
 def search_neighbourhoods(problem: InferenceProblem, base: Fit, fits: Fits, n_effects: int = N_EFFECTS) -> None:
@@ -141,7 +140,7 @@ def _continue_unfinished(
     """
     for component in (replace(fit.hypothesis.components[-1], location=location) for location in locations):
         known = fits[component.key]
-        if known.has_converged or known.cost >= UNFINISHED_COST_RATIO * fit.cost + MAX_BEHIND_COMPLETE:
+        if known.has_converged or known.cost >= COST_RATIO * fit.cost + MAX_BEHIND_COMPLETE:
             continue
         continued = fits[component.key] = problem.fit_to_convergence(known)
         if continued.cost > fit.cost:

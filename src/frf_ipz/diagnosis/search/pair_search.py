@@ -17,6 +17,8 @@ from frf_ipz.diagnosis.evidence.fit import NEARLY_ALL, Fit
 from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, compute_weights
 from frf_ipz.diagnosis.evidence.map_fit import fit_map
 from frf_ipz.diagnosis.search.component_search import (
+    COST_SLACK,
+    PROMISED_PART,
     Ranking,
     count_exact_fits,
     group_by_effect,
@@ -25,8 +27,12 @@ from frf_ipz.diagnosis.search.component_search import (
     search_small_component,
 )
 from frf_ipz.diagnosis.search.global_scan import scan_globally
-from frf_ipz.diagnosis.search.neighbourhood_search import GAIN, Fits, find_cost_limit, search_neighbourhoods
+from frf_ipz.diagnosis.search.neighbourhood_search import Fits, find_cost_limit, search_neighbourhoods
 from frf_ipz.diagnosis.search.robust_refinement import (
+    COST_RATIO,
+    GAIN,
+    LOCATIONS_PER_EFFECT,
+    N_STEPPED,
     REFINED_ERROR,
     Start,
     refine,
@@ -47,12 +53,10 @@ MAX_COST_LEFT = 0.8  # of the cost of one component: if a second leaves more, th
 COMPETITIVE = 100.0  # log Bayes factor behind the best pair: such a pair's components are located anew
 MAX_SIMPLER = 2  # other effects that are tried for one component of a pair
 MAX_TURNS = 6  # of stepping one component of a pair and then the other
-PROMISED = 0.5  # of the evidence that another pair needs: what a linear step must promise of it
 N_FIRSTS, FIRST_COST_RATIO = 8, 3.0  # components that get companions, and times the best cost
-N_COMPANIONS, LOCATIONS_PER_EFFECT = 12, 3  # of each that are refined, and of an effect
-N_STEPPED, STEPPED_COST_RATIO = 8, 2.0  # pairs whose neighbours are tried far from the axis, and times the best cost
+N_COMPANIONS = 12  # of each that are refined
+STEPPED_COST_RATIO = 2.0  # times the best cost: pairs whose neighbours are tried far from the axis
 N_HALFWAY, N_ROUGH, N_EXACT = 16, 8, 4  # that come half-way to the axis, to it, and are fitted exactly
-EXACT_COST_RATIO, COST_SLACK = 4.0, 400.0  # times the best cost, plus: beyond, pairs are not fitted exactly
 
 
 def search_pair(problem: InferenceProblem, first: Ranking, is_good: Callable[[Fit], bool]) -> Ranking:
@@ -110,7 +114,7 @@ def _search_other_firsts(problem: InferenceProblem, first: Ranking, best: Fit, c
     """Search beside other first components: one with parameters of its own may have stood for both."""
     firsts = [fits[0] for fits in group_by_effect(first.fits)[1 : 1 + count] if fits[0].is_nearly_right]
     rankings = [
-        search_small_component(problem, alternative, PROMISED * (best.log_evidence - alternative.log_evidence))
+        search_small_component(problem, alternative, PROMISED_PART * (best.log_evidence - alternative.log_evidence))
         for alternative in firsts
     ]
     return [_reposition(problem, pairs) if _is_competitive(pairs.best, best) else pairs for pairs in rankings]
@@ -133,7 +137,7 @@ def _reposition(problem: InferenceProblem, pairs: Ranking) -> Ranking:
     if base.hypothesis.components[0].key == pairs.base.hypothesis.components[0].key or not base.is_nearly_right:
         return repositioned
     return _most_probable(
-        [repositioned, search_small_component(problem, base, PROMISED * (best.log_evidence - base.log_evidence))]
+        [repositioned, search_small_component(problem, base, PROMISED_PART * (best.log_evidence - base.log_evidence))]
     )
 
 
@@ -195,7 +199,7 @@ def _fit_pairs_roughly(problem: InferenceProblem, pairs: list[tuple[Component, S
     rough_fits = [problem.fit_roughly((*known, start.component), start.values) for known, start in halfway[:N_ROUGH]]
     rough_fits.sort(key=lambda fit: fit.cost)
     exact = rough_fits[: count_exact_fits(rough_fits, N_EXACT)]
-    return [fit for fit in exact if fit.cost <= EXACT_COST_RATIO * rough_fits[0].cost + COST_SLACK]
+    return [fit for fit in exact if fit.cost <= COST_RATIO * rough_fits[0].cost + COST_SLACK]
 
 
 def _drop_duplicates(pairs: list[tuple[Component, Start]]) -> list[tuple[Component, Start]]:

@@ -37,11 +37,12 @@ SETTINGS = LevenbergMarquardt(
 )
 REFINED_ERROR = 0.01  # of an FRF's size: what counts as a misfit after the global scan
 LOCATIONS_PER_EFFECT = 3  # of an effect that are refined
-N_STEPPED, COST_RATIO = 8, 4.0  # hypotheses whose neighbours are tried far from the axis, and times the best cost
+N_STEPPED = 8  # hypotheses whose neighbours are tried far from the axis
+COST_RATIO = 4.0  # times the best cost: what is further behind is not followed any more
 N_STEPPED_HALFWAY = 3  # hypotheses whose neighbours are tried half-way to the axis
 NEIGHBOURHOOD = 2  # nodes or elements: locations so near are not distinguished there
 MAX_STEPS = 12
-GAIN = 0.5  # of the robust misfit: a neighbour must be better by that
+GAIN = 0.5  # of a robust misfit or a log Bayes factor: a neighbour must be better by that
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -21,6 +21,7 @@ from frf_ipz.diagnosis.verdict.goodness import (
     STRONG_LOG_BAYES_FACTOR,
     Goodness,
     assess_goodness,
+    required_beside,
 )
 
 if TYPE_CHECKING:
@@ -168,9 +169,7 @@ def _accept_first(problem: InferenceProblem, first: Decision) -> Decision:
     required = min(FIRST_LOG_BAYES_FACTOR, LIMITS[problem.kind].second_log_bayes_factor)
     if not first.null_goodness.is_good and log_bayes_factor(first.final, first.null) < required:
         return replace(first, verdict=DiagnosisVerdict.UNEXPLAINED, final=first.null, goodness=first.null_goodness)
-    second = rescore_ambiguity_set(
-        problem, search_small_component(problem, first.final, LIMITS[problem.kind].beside_log_bayes_factor)
-    )
+    second = rescore_ambiguity_set(problem, search_small_component(problem, first.final, required_beside(problem)))
     pair_decision = _accept_further(problem, first, second)
     if pair_decision is None and first.goodness.score > PAIR_SCORE:
         pair_decision = _accept_further(problem, first, _search_pair(problem, first.ranking))
@@ -189,7 +188,7 @@ def _drop_needless(problem: InferenceProblem, first: Decision, pair_fit: Fit) ->
     for number in range(2):
         single = fit_without_component(problem, pair_fit, number)
         goodness = assess_goodness(problem, single)
-        if goodness.is_good and log_bayes_factor(pair_fit, single) <= LIMITS[problem.kind].beside_log_bayes_factor:
+        if goodness.is_good and log_bayes_factor(pair_fit, single) <= required_beside(problem):
             fits = tuple(sorted((single, *first.ranking.fits), key=lambda fit: -fit.log_evidence))
             return replace(first, final=single, ranking=replace(first.ranking, fits=fits), goodness=goodness)
     return None
@@ -203,7 +202,7 @@ def _accept_further(problem: InferenceProblem, decision: Decision, ranking: Rank
     gain = ranking.best_evidence - max(decision.final.log_evidence, decision.null.log_evidence)
     required = limits.second_log_bayes_factor if goodness.is_good else PARTIAL_LOG_BAYES_FACTOR
     if decision.goodness.is_good:
-        required = decision.goodness.error_underestimation * limits.beside_log_bayes_factor
+        required = decision.goodness.error_underestimation * required_beside(problem)
     if gain <= required or goodness.score >= max(decision.goodness.score, 1.0):
         return None
     verdict = DiagnosisVerdict.EXPLAINED if goodness.is_good else DiagnosisVerdict.UNEXPLAINED

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import expit
 
-from frf_ipz.diagnosis.result import Estimate, Finding, describe_location_set, with_confidence
+from frf_ipz.diagnosis.result import (
+    LISTED_PROBABILITY,
+    MAX_LOCATIONS,
+    NORMAL_95,
+    Estimate,
+    Finding,
+    describe_location_set,
+    with_confidence,
+)
 from frf_ipz.diagnosis.search.component_search import group_by_effect
 
 if TYPE_CHECKING:
@@ -18,9 +26,6 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.fit import Fit
     from frf_ipz.diagnosis.location import Location
 
-NORMAL_95 = 1.96
-LISTED_PROBABILITY = 0.95  # probability that the listed locations hold
-MAX_LOCATIONS = 12
 INSIGNIFICANT_RATIO = 2.0  # times a tolerance: a user's tolerances are half widths, not standard deviations
 
 

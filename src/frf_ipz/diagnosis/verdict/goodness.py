@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.fit import Data, Fit
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
 
+ODDS = 20.0  # to one: what is likelier than that is held to be so
+LOG_ODDS = float(np.log(ODDS))
 FIRST_LOG_BAYES_FACTOR = 30.0  # of a finding over the nominal model
 PARTIAL_LOG_BAYES_FACTOR = 50.0  # of a second finding over the first one alone, where the two do not explain all
 STRONG_LOG_BAYES_FACTOR = 200.0  # of a second finding: with less, a third one is not searched for
@@ -40,8 +42,9 @@ class Limits:
         Of a first finding over the nominal model.
     second_log_bayes_factor : float
         Of a second finding over the first one alone, where the two leave nothing to explain.
-    beside_log_bayes_factor : float
-        The same where the first one leaves nothing to explain either.
+    beside_log_bayes_factor : float or None
+        The same where the first one leaves nothing to explain either; None where noise is known so well that odds and
+        the number of hypotheses say it.
     frequency_deviation : float
         Standard deviations of one natural frequency: 153 tests with nothing missing reached 1.0; FRFs of two states,
         whose tolerances are learnt from one of them, 2.8.
@@ -51,7 +54,7 @@ class Limits:
     subband: float
     first_log_bayes_factor: float = FIRST_LOG_BAYES_FACTOR
     second_log_bayes_factor: float = PARTIAL_LOG_BAYES_FACTOR
-    beside_log_bayes_factor: float = 80.0
+    beside_log_bayes_factor: float | None = 80.0
     frequency_deviation: float = 2.5
 
 
@@ -61,13 +64,33 @@ class Limits:
 # and 60 more with their true components 1.2 and 3.6 (from 81000000 and 91000000), one of 8 later ones 4.5 in a subband
 # (from 152000000); 11 with shakers that run already, six of them with their true components, 0.7, 1.5 and 3 (from
 # 121000000, 131000000 and 141000000). Beside one true component a second one gained no more than 1 in 40 tests with a
-# hammer. Where one leaves something to explain that a second one explains, odds of 20 to 1 are enough.
+# hammer. Where one leaves something to explain that a second one explains, the odds are enough.
 LIMITS = {
-    "hammer": Limits(misfit=1.1, subband=3.6, second_log_bayes_factor=3.0, beside_log_bayes_factor=8.0),
-    "random": Limits(misfit=1.3, subband=5.0, second_log_bayes_factor=3.0, beside_log_bayes_factor=8.0),
+    "hammer": Limits(misfit=1.1, subband=3.6, second_log_bayes_factor=LOG_ODDS, beside_log_bayes_factor=None),
+    "random": Limits(misfit=1.3, subband=5.0, second_log_bayes_factor=LOG_ODDS, beside_log_bayes_factor=None),
     "running": Limits(misfit=1.5, subband=5.0, first_log_bayes_factor=40.0),
     "frf": Limits(misfit=2.2, subband=6.5, first_log_bayes_factor=80.0, frequency_deviation=MAX_SINGLE_DEVIATION),
 }
+
+
+def required_beside(problem: InferenceProblem) -> float:
+    """Give the log Bayes factor that a component needs beside one that leaves nothing to explain.
+
+    With ``N`` kinds of effects the prior of one of them is ``1 / N``, that of its location is in its evidence already:
+    ``ln N`` and the logarithm of the odds are what data have to make up for.
+
+    Parameters
+    ----------
+    problem : InferenceProblem
+        With the effects that are searched for.
+
+    Returns
+    -------
+    float
+        Calibrated instead where the noise is not known from repeated records.
+    """
+    calibrated = LIMITS[problem.kind].beside_log_bayes_factor
+    return LOG_ODDS + float(np.log(max(len(problem.effects), 1))) if calibrated is None else calibrated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,6 +16,7 @@ from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.response import nuisance_jacobian
 from frf_ipz.diagnosis.result import Curves
 from frf_ipz.diagnosis.search.global_scan import MOTIONS_AT_ONCE, evaluate_receptances
+from frf_ipz.diagnosis.search.robust_refinement import REFINED_ERROR
 from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
@@ -33,7 +34,6 @@ else:
 N_SUBBANDS = 6  # subbands, on a logarithmic scale
 DISAGREES = 3.0  # standard deviations
 N_NAMED = 3  # FRFs and bands in the text
-ERROR = 0.01  # of an FRF's size: what counts as a misfit
 MIN_FRFS = 2
 MIN_EXPLAINED = 0.1  # of the misfit: a node that explains less is no location
 
@@ -130,7 +130,7 @@ def _compute_misfits(problem: InferenceProblem, null: Fit, motions: Sequence[Mot
     nuisance = null.nuisance if is_on_fit else np.zeros(problem.nuisance_prior.size)
     response = null.hypothesis.respond(null.values, nuisance, data.s)
     gains = problem.sparse_data.gains(response) if is_on_fit else 1.0
-    weights = compute_weights(data, ERROR)
+    weights = compute_weights(data, REFINED_ERROR)
     misfit = data.values - gains * response.values
     before = np.sum(weights * np.abs(misfit) ** 2, axis=1)
     remaining = []

@@ -20,9 +20,9 @@ from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Attachment, Change
 from frf_ipz.diagnosis.search.component_search import rank_fits
 from frf_ipz.diagnosis.search.global_scan import scan_globally
-from frf_ipz.diagnosis.search.neighbourhood_search import search_neighbourhoods
+from frf_ipz.diagnosis.search.neighbourhood_search import MAX_BEHIND_COMPLETE, search_neighbourhoods
 from frf_ipz.diagnosis.search.robust_refinement import refine_halfway, refine_starts
-from frf_ipz.diagnosis.verdict.goodness import LIMITS
+from frf_ipz.diagnosis.verdict.goodness import required_beside
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 ORDERS = 0.05, 1.95
 LOSSES = 1e-3, 30.0  # in the middle of the band; with more it is a damper
 N_ROUGH = 5  # locations that are fitted with inflated errors
-MAX_BEHIND = 300.0  # of the cost with inflated errors: beyond, a force is not fitted exactly
 
 
 class LocalForce(ViscoelasticJoint):
@@ -189,11 +188,9 @@ def find_unnamed_force(problem: InferenceProblem, decision: Decision) -> Fit | N
     kinds = [kind for kind in KINDS if are_dynamic or (kind.rivals_several and len(components) > 1)]
     if not kinds:
         return None
-    cost_limit = problem.fit_roughly(components, decision.final.values).cost + MAX_BEHIND
+    cost_limit = problem.fit_roughly(components, decision.final.values).cost + MAX_BEHIND_COMPLETE
     fits = [fit for kind in kinds if (fit := _fit_best_location(problem, decision.null, kind, cost_limit)) is not None]
-    required_log_evidence = decision.final.log_evidence + (
-        LIMITS[problem.kind].beside_log_bayes_factor if len(components) == 1 else 0.0
-    )
+    required_log_evidence = decision.final.log_evidence + (required_beside(problem) if len(components) == 1 else 0.0)
     return max(
         (fit for fit in fits if fit.log_evidence > required_log_evidence),
         key=lambda fit: fit.log_evidence,

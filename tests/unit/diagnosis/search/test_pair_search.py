@@ -19,8 +19,8 @@ from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search import pair_search as pairs
 from frf_ipz.diagnosis.search.component_search import (
+    LOCATIONS_PER_EFFECT,
     N_SCORED,
-    SCORED_PER_EFFECT,
     Ranking,
     _most_promising,
     fit_null_model,
@@ -31,7 +31,7 @@ from frf_ipz.diagnosis.search.pair_search import search_pair
 from frf_ipz.diagnosis.search.robust_refinement import Start
 from frf_ipz.diagnosis.search.score_tests import run_score_test
 from frf_ipz.diagnosis.verdict.decision import decide
-from frf_ipz.diagnosis.verdict.goodness import LIMITS, assess_goodness
+from frf_ipz.diagnosis.verdict.goodness import LIMITS, ODDS, assess_goodness
 from frf_ipz.diagnosis.verdict.out_of_catalogue import describe_implausibility
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beam_models import with_formulation
@@ -129,9 +129,7 @@ def test_a_small_effect_beside_one_that_explains_nearly_all_is_named(nominal, mo
     assert [component.effect.name for component in decide(problem, silent).final.hypothesis.components] == [
         "added_mass"
     ]
-    monkeypatch.setitem(
-        LIMITS, "frf", replace(LIMITS["frf"], beside_log_bayes_factor=LIMITS["hammer"].beside_log_bayes_factor)
-    )
+    monkeypatch.setitem(LIMITS, "frf", replace(LIMITS["frf"], beside_log_bayes_factor=None))
     decision = decide(problem, silent)
     assert [component.effect.name for component in decision.final.hypothesis.components] == [
         "added_mass",
@@ -166,16 +164,16 @@ def test_the_detectable_size_has_the_required_evidence(nominal, monkeypatch):
 def test_neighbourhoods_are_searched_only_where_an_effect_explains_something(nominal):
     names = ("added_mass", "grounded_spring")
     nothing = problem_of(nominal, measured(nominal), names)
-    assert len(search_component(nothing, fit_null_model(nothing)).fits) <= len(names) * SCORED_PER_EFFECT
+    assert len(search_component(nothing, fit_null_model(nothing)).fits) <= len(names) * LOCATIONS_PER_EFFECT
     heavier = problem_of(nominal, measured(with_point_masses(nominal, {12: 0.02})), names)
     keys = {fit.hypothesis.components[0].key for fit in search_component(heavier, fit_null_model(heavier)).fits}
-    assert {("added_mass", node, "z") for node in (11, 12, 13)} <= keys
+    assert {("added_mass", Location.at_node(node, "z")) for node in (11, 12, 13)} <= keys
 
 
 def test_nothing_is_added_to_an_effect_that_explains_all(nominal):
     problem = problem_of(nominal, measured(with_point_masses(nominal, {12: 0.02})), ("added_mass", "grounded_spring"))
     best = search_component(problem, fit_null_model(problem)).best
-    beside = search_small_component(problem, best, LIMITS["hammer"].beside_log_bayes_factor)
+    beside = search_small_component(problem, best, np.log(ODDS * len(problem.effects)))
     assert beside.fits == ()
     assert beside.n_tried > 5
 

@@ -10,6 +10,7 @@ from frf_ipz.diagnosis.verdict import decision
 from frf_ipz.diagnosis.verdict.goodness import LIMITS
 
 ALONE = -577.0  # nats
+N_KINDS = 18
 
 
 def a_fit(log_evidence, name="local_stiffness"):
@@ -22,6 +23,10 @@ def goodness_of(score, underrated=1.0):
     return SimpleNamespace(
         is_good=score <= 1, score=score, error_underestimation=underrated, required_log_bayes_factor=needed
     )
+
+
+def problem_of_kind(kind):
+    return SimpleNamespace(kind=kind, effects=dict.fromkeys(range(N_KINDS)))
 
 
 def found(score):
@@ -39,15 +44,21 @@ def found(score):
 
 @pytest.mark.parametrize(
     ("score", "gain", "n_locations", "verdict"),
-    [(1.1, 2.0, 1, None), (1.1, 3.1, 1, "explained"), (1.1, 2.0, 4, "explained"), (0.8, 7.0, 1, None)],
+    [
+        (1.1, 2.0, 1, None),
+        (1.1, 3.1, 1, "explained"),
+        (1.1, 2.0, 4, "explained"),
+        (0.8, 5.0, 1, None),
+        (0.8, 7.0, 1, "explained"),
+    ],
 )
 def test_a_second_component_needs_odds_of_twenty_to_one_at_any_location(monkeypatch, score, gain, n_locations, verdict):
-    """Where nothing is left to explain, more is asked for."""
+    """Where nothing is left to explain, it is one of all kinds of effects: of 18, ln(18 * 20) = 5.9 nats."""
     assert np.exp(LIMITS["hammer"].second_log_bayes_factor) == pytest.approx(20, rel=0.01)
     monkeypatch.setattr(decision, "assess_goodness", lambda *_: goodness_of(0.5))
     first = found(score)
     second = Ranking(base=first.final, fits=tuple(a_fit(ALONE + gain) for _ in range(n_locations)), n_tried=9)
-    pair = decision._accept_further(SimpleNamespace(kind="hammer"), first, second)
+    pair = decision._accept_further(problem_of_kind("hammer"), first, second)
     assert (pair and pair.verdict) == verdict
 
 
@@ -78,7 +89,7 @@ def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, kind, gain
     monkeypatch.setattr(decision, "search_component", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
     monkeypatch.setattr(decision, "rescore_ambiguity_set", lambda _, ranking: ranking)
     monkeypatch.setattr(decision, "search_small_component", lambda *_: Ranking(base=best, fits=(), n_tried=1))
-    decided = decision.decide(SimpleNamespace(kind=kind), lambda *_: None)
+    decided = decision.decide(problem_of_kind(kind), lambda *_: None)
     assert decided.verdict == verdict
     assert decided.final is (best if verdict == "explained" else null)
 
@@ -98,7 +109,7 @@ def test_what_an_effect_leaves_in_a_subband_shows_whether_errors_are_underestima
     monkeypatch.setattr(decision, "rescore_ambiguity_set", lambda _, ranking: ranking)
     monkeypatch.setattr(decision, "is_significant", lambda *_: True)
     monkeypatch.setattr(decision, "search_small_component", lambda *_: Ranking(base=best, fits=(), n_tried=1))
-    assert decision.decide(SimpleNamespace(kind="hammer"), lambda *_: None).verdict == verdict
+    assert decision.decide(problem_of_kind("hammer"), lambda *_: None).verdict == verdict
 
 
 @pytest.mark.parametrize(("score", "n_components"), [(0.7, 1), (0.8, 2)])
@@ -113,6 +124,4 @@ def test_an_effect_that_needs_much_nuisance_gives_way_to_two(monkeypatch, score,
     monkeypatch.setattr(decision, "rescore_ambiguity_set", lambda _, ranking: settled if ranking is tied else ranking)
     monkeypatch.setattr(decision, "search_small_component", lambda *_: nothing)
     monkeypatch.setattr(decision, "search_pair", lambda *_: tied)
-    assert (
-        len(decision._accept_first(SimpleNamespace(kind="hammer"), first).final.hypothesis.components) == n_components
-    )
+    assert len(decision._accept_first(problem_of_kind("hammer"), first).final.hypothesis.components) == n_components

@@ -18,6 +18,7 @@ from frf_ipz.diagnosis.catalogue.effect import (
     list_neighbouring_nodes,
     list_node_locations,
 )
+from frf_ipz.diagnosis.catalogue.effects.added_mass import SMALLEST
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Attachment, Change
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.result import Estimate
 
-SMALLEST, LARGEST = 1e-5, 1.0  # of the mass of the structure
+LARGEST = 1.0  # of the mass of the structure
 LOWEST, HIGHEST = 0.5, 1.6  # of the edges of the band: beyond, it is a spring, a damper or a mass
 RATIOS = 1e-3, 0.5
 USUAL_RATIO, WITHIN = 0.05, 1.7  # the largest of real resonators, and the factor by which it may be more

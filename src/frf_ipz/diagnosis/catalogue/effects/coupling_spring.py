@@ -10,7 +10,7 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Signature
-from frf_ipz.diagnosis.catalogue.effects.grounded_spring import floating, is_floating
+from frf_ipz.diagnosis.catalogue.effects.grounded_spring import SOFTEST, STIFFEST, floating, is_floating
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
 from frf_ipz.diagnosis.model.motion import Motion, make_unit_stiffness
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.result import Estimate
 
-SOFTEST, STIFFEST = 1e-5, 1e3  # of the structure's own stiffness against that motion
 MAX_IN_A_ROW, MAX_NODES = 48, 100  # of which all pairs are listed; those between are stepped to
 FURTHEST = 3  # nodes in a row around each end
 NEXT_TO = 2  # nodes in a row that count as one location: what joins them is the structure itself

@@ -20,15 +20,21 @@ from scipy.linalg import block_diag
 from scipy.ndimage import uniform_filter1d
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.diagnosis.measured.contour import find_resonances
-from frf_ipz.diagnosis.measured.forces import MISSING_SAMPLES, RINGING, Pulse, isolate_pulse, missing_ringing
+from frf_ipz.diagnosis.measured.contour import WINDOW_DECAYS, find_resonances
+from frf_ipz.diagnosis.measured.forces import (
+    FIRST_SAMPLES,
+    MISSING_SAMPLES,
+    RINGING,
+    Pulse,
+    isolate_pulse,
+    missing_ringing,
+)
 from frf_ipz.diagnosis.measured.group_spectra import FINER, GroupSpectra, group_records, transform_group
 from frf_ipz.diagnosis.measured.local_pole import LocalPole, fit_local_pole, lines_around_pole
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord
 
-WINDOW_DECAYS = 8.0  # sigma times the shortest record
 LARGEST_OFFSET = 0.05  # of a channel's highest value: a larger offset has been removed already
 OFFSET_DRIFT = 3.0  # times the noise: how far an offset drifts from record to record
 MODAL_MOTION = 3.0  # times the motion just before an impact: standard deviation of each mode's residual motion
@@ -39,7 +45,6 @@ ROUNDS = 3  # of weights: in the first one residual motion counts as noise
 CORRELATED_NOISE = 0.1  # of a sample's variance: noise that the samples before an impact have in common
 MIN_RECORDS = 2  # of a shaker in a group: a single one determines no offset
 STARTED = 0.02  # of a shaker's largest force: with more it has started
-FIRST_SAMPLES = 3  # that stand for the missing ringing
 MIN_SAMPLES_BEFORE = 4  # an impact, that show the residual motion
 LEAST_NOISE = 1e-7  # of a channel's highest value: below the resolution of 24 bits, for channels that show nothing
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawStart, estimate_location_motion
+from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import CONVERGED, LawStart, estimate_location_motion
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import INDISTINGUISHABLE
 from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import LinearFit, as_real_rows, linear_sensor_motion
 from frf_ipz.diagnosis.nonlinear.fitting.location_motion import NumericalLaplace
@@ -35,7 +35,6 @@ FEW_ROUNDS, MANY_ROUNDS = 3, 8
 FINALISTS = 4  # locations that are fitted on long segments
 BEAM_WIDTH, SEARCH_STEPS = 3, 24  # locations whose neighbours are fitted, and steps: few, unless the law is far off
 RIDGE = 1e-6  # of a column's own square: many of the laws are nearly equal
-CONVERGED = 1e-3  # relative change of the cost between rounds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -14,6 +14,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.location import Location
+from frf_ipz.diagnosis.model.modes import SUSPENSION_RATIO
 from frf_ipz.dofs import TRANSLATIONS, AnyDof, Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.assembly import multiply
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 MODES_TO = 6.0  # times the top of the band: modes that are kept; a stop or friction excites all of them
 MIN_MODES = 8
 SUSPENSION_PART = 0.01  # of the first elastic frequency: that of a suspension of which nothing is known
-SUSPENSION_DAMPING = 0.03
 MAX_LOG_CHANGE = 20.0  # of a frequency or damping ratio: a step that diverged must not overflow
 LEAST_DAMPING_PART = 0.5  # of the stated damping: with less, more motion remains at the next impact
 
@@ -256,7 +256,7 @@ def _suspended_poles(model: StructuralModel, basis: ModalBasis) -> tuple[FloatAr
     rigid = basis.n_rigid
     if rigid:
         omega[:rigid] = SUSPENSION_PART * (omega[rigid] if len(omega) > rigid else 1.0)
-        ratio[:rigid] = SUSPENSION_DAMPING
+        ratio[:rigid] = SUSPENSION_RATIO
     return omega, ratio
 
 
