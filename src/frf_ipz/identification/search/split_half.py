@@ -251,6 +251,7 @@ def _shift_without_unconfirmed(fitted: FittedModes, n_halves: IntArray) -> Float
             continue
         nearest = refitted[np.argmin(np.abs(poles[neighbours][:, None] - refitted), axis=1)]
         shift = nearest - poles[neighbours]
-        shift *= np.minimum(1.0, -poles[neighbours].real / np.maximum(np.abs(shift), np.finfo(float).tiny))
+        reach = -poles[neighbours].real
+        shift *= reach / np.maximum(np.abs(shift), reach)
         variance[:, neighbours] += share[number] * (1 - share[number]) * np.stack([shift.real, shift.imag]) ** 2
     return np.asarray(np.sqrt(variance).ravel())
