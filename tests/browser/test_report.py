@@ -18,7 +18,7 @@ LONG = f"<details><table>{'<tr><td>1</td></tr>' * 50}</table></details>"
 ROWS_AND_STATE = (
     "return [...document.querySelectorAll('main details')].map((d) => [d.querySelectorAll('tr').length, d.open])"
 )
-DRAWN = ".main-svg .trace, .main-svg .bars, .main-svg .hm"
+DRAWN = ".main-svg .trace, .main-svg .bars, .main-svg .hm, canvas"
 
 
 @pytest.fixture(scope="module")

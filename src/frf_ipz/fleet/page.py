@@ -67,7 +67,7 @@ def write_page(name: str, analysis: FleetAnalysis, out: Path) -> None:
         style=read_asset(REPORT, "page.css"),
         margins=margin_style(name, f"frf_ipz {__version__}", ""),
         library=packed_asset(REPORT, PLOTLY),
-        script=read_asset(REPORT, "page.js"),
+        scripts=[read_asset(REPORT, "page.js")],
         policy=page_policy(*[read_asset(REPORT, script) for script in SCRIPTS]),
     )
     write_text(out / PAGE, text)
