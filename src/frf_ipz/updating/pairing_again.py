@@ -17,7 +17,7 @@ import numpy as np
 from frf_ipz.pairing.model_roots import model_poles, model_zeros
 from frf_ipz.pairing.pair import NO_ROOT, pair_roots, sure_partners
 from frf_ipz.pairing.pairs import Pair, Pairs, PairVerdict
-from frf_ipz.pairing.poles import pair_poles
+from frf_ipz.pairing.poles import measured_amplitudes, pair_poles
 from frf_ipz.updating.fall_back import median_deviation_db
 
 if TYPE_CHECKING:
@@ -71,8 +71,8 @@ class PairingAgain:
         tuple of Pairs and UpdateProblem, or None
             Named by the roots of the updated model; None where all measured poles keep their counterparts.
         """
-        if self.fit.modes_given is not None or not self.fit.labels:
-            return None
+        if self.fit.modes_given is not None or not measured_amplitudes(self.fit)[0].any():
+            return None  # poles and zeros without shapes say no more than before
         poles = model_poles(model, self.fit.labels)
         sure = sure_partners(pair_poles(self.fit, poles))
         met = {
