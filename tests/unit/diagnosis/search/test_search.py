@@ -219,7 +219,10 @@ def test_faint_frfs_are_named(nominal):
 
 def fit_of(name, evidence, value, std, location):
     effect = SimpleNamespace(
-        name=name, report_value=lambda _make_location, _name, value: value, statement=lambda *_: ""
+        name=name,
+        report_value=lambda _make_location, _name, value: value,
+        statement=lambda *_: "",
+        texts=lambda _location: {},
     )
     component = SimpleNamespace(effect=effect, location=Location.at_node(location))
     parameter = SimpleNamespace(name="mass_kg", is_log=True, low=1e-4, high=1.0, tolerance=0.0)
