@@ -15,8 +15,8 @@ from frf_ipz.show.controls import Choices, list_choices
 from frf_ipz.show.page import SHOW, Addresses, page_sections
 from hostile_run import HOSTILE, hostile_folder
 
-SCRIPTS_OF_REPORT = 3  # the data, plotly, the page's own
-SCRIPTS_OF_SHOW = 5
+SCRIPTS_OF_REPORT = 5  # data of pictures and shapes, plotly, the two of the page
+SCRIPTS_OF_SHOW = 6  # the data, plotly, the four of the page
 
 
 class Reader(HTMLParser):
