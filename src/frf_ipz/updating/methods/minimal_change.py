@@ -43,6 +43,7 @@ else:
 SMALLEST_NOISE = 1e-6  # relative standard deviation of a frequency: none is measured better
 EXCLUDED_STD = 1.0  # relative standard deviation of an excluded target
 OF_DAMPING = 1.0  # change of the logarithm of a modulus by damping, from which damping makes a root
+UNKNOWN_STD = 1e15  # relative, of what is no target: however far its root runs, and with it what moves it
 STEPS_BACK = 16  # to the nominal model: so many that roots keep the greater part of their vectors over each
 SHIFTED = 0.1  # standard deviations of a modulus from which the stiffness is updated again for the change by damping
 
@@ -122,7 +123,7 @@ def _solve(
     roots = phase.named_roots(theta, problem.computed)
     stated = _change_by_damping(problem.computed, roots)
     # a zero that is there by damping only tells nothing of stiffness
-    of_damping = np.where(np.abs(stated) > OF_DAMPING, stated**2, 0.0)
+    of_damping = np.where(np.abs(stated) > OF_DAMPING, UNKNOWN_STD**2, 0.0)
     phase = replace(phase, targets=phase.targets - stated, noise=phase.noise.plus(of_damping))
     excluded, likely = contradicted_targets(phase, roots, theta)
     is_excluded = np.isin(np.arange(len(phase.target_roots.frf)), excluded)
