@@ -219,14 +219,14 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
     errors = residue_errors if fitted.poles_are_held else errors
     zeros = find_zeros(errors, lines.s)
     unit = np.abs(lines.s[:, None]) ** lines.powers
-    misfit = lines.receptance - response(fit.system, terms, lines.s)
+    computed = response(fit.system, terms, lines.s)
     of_frfs = pd.DataFrame({"delay_s": fitted.delay_s, "gain": gains.of_frf, "gain_std": gains.of_frf_std})
-    misfit_frame = misfit_table(lines.frequency_hz, misfit * unit, np.sqrt(fitted.noise) * unit, frfs.labels)
+    misfit = (lines.receptance - computed) * unit
+    misfit_frame = misfit_table(lines.frequency_hz, misfit, np.sqrt(fitted.noise) * unit, frfs.labels)
     model = measured_model(fit.system, terms, lines.powers, order, fitted.delay_s)
     # what an error of the force is at the poles themselves, residues have followed
     common = np.zeros(frfs.n_frfs) if fitted.force_error is None else fitted.force_error.rms_of_frfs
     of_force = common**2 / 2 * np.abs(model.residues[:n_modes]) ** 2
-    values = np.abs(response(fit.system, terms, lines.s)) * unit
     return ModalFit(
         model=model,
         n_modes=n_modes,
@@ -237,7 +237,7 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
         zeros=zeros.zeros,
         covariance=_root_covariance(errors, zeros, modes),
         residue_covariance=residue_covariance(errors, lines.powers, modes) + of_force[:, :, None, None] * np.eye(2),
-        value_std=np.hypot(value_std(errors, lines.s) * unit, common * values),
+        value_std=np.hypot(value_std(errors, lines.s) * unit, common * np.abs(computed) * unit),
         stabilization=columns_of_modes(fitted.start, natural_frequency_hz(fit.poles[modes]), options.stability),
         stability=options.stability,
         decisions=_decisions(fitted, modes, unconfirmed),

@@ -12,6 +12,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray, IntArray, Matrix
 
 Vectors: TypeAlias = ComplexArray | FloatArray
 ROUNDING = 1e-10  # of the largest entry or eigenvalue of a matrix
+PAIRS_AT_ONCE = 256  # of vectors, for `add_forms`: what is made of them stays in the cache
 SPARSE = 0.1  # of the entries of all vectors, up to which sparse products are faster
 
 
@@ -67,7 +68,7 @@ class LowRankMatrices:
         return result
 
     def add_forms(self, result: FloatArray, left: Vectors, right: Vectors) -> None:
-        """Add the real parts of ``y^T A_p x`` to a result: some hundred pairs at a time stay in the cache.
+        """Add the real parts of ``y^T A_p x`` to a result, best of `PAIRS_AT_ONCE` pairs at a time.
 
         Parameters
         ----------

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.numerics.pencils import Roots
     from frf_ipz.runs.results import Results
     from frf_ipz.structure import Geometry, ReducedModel
 
@@ -98,16 +99,40 @@ def mode_shape(run: Results, number: int) -> Shape:
     InputError
         If there is no such mode.
     """
-    fit = run.fit
-    if fit is None or not 0 <= number < fit.n_modes:
+    if run.fit is None or not 0 <= number < run.fit.n_modes:
         raise InputError(f"this run has no mode {number + 1}")
+    return _mode_shape(run, run.fit, number, {})
+
+
+def mode_shapes(run: Results) -> list[Shape]:
+    """Give all modes of the fit, measured and of both models.
+
+    Parameters
+    ----------
+    run : Results
+        What the run holds.
+
+    Returns
+    -------
+    list of Shape
+        As `mode_shape` gives each; the models are solved once.
+    """
+    roots: dict[str, Roots] = {}
+    return [] if run.fit is None else [_mode_shape(run, run.fit, mode, roots) for mode in range(run.fit.n_modes)]
+
+
+def _mode_shape(run: Results, fit: ModalFit, number: int, roots: dict[str, Roots]) -> Shape:
+    """Give a mode; `roots` holds the poles of the models that have been solved."""
     measured = _measured_shape(fit, number)
     frequency = float(natural_frequency_hz(fit.model.poles[number : number + 1])[0])
     models = _models(run, number)
     title = "measured" if models or run.updated_model is None else "measured; the model has no counterpart of this mode"
     motions = [_scaled(Motion(name="measured", title=title, dofs=tuple(measured), values=_values(measured)))]
     for name, (model, target) in models.items():
-        root, vector = _closest_mode(model, target)
+        if name not in roots:
+            roots[name] = damped_poles(model.mass, model.damping, model.stiffness)
+        closest = int(np.argmin(np.abs(roots[name].values - target)))
+        root, vector = complex(roots[name].values[closest]), roots[name].right_vectors[:, closest]
         motion = Motion(name=name, title=name, dofs=model.expanded_dofs, values=model.expansion @ vector)
         motions.insert(0, _scaled_onto(motion, motions[-1], abs(root) / (2 * np.pi)))
     return Shape(title=f"Mode {number + 1}, {frequency:.5g} Hz", motions=tuple(motions))
@@ -208,12 +233,6 @@ def _models(run: Results, number: int) -> dict[str, tuple[ReducedModel, complex]
                 "updated": (updated.model, complex(updated.after[target])),
             }
     return {}
-
-
-def _closest_mode(model: ReducedModel, pole: complex) -> tuple[complex, ComplexArray]:
-    roots = damped_poles(model.mass, model.damping, model.stiffness)
-    mode = int(np.argmin(np.abs(roots.values - pole)))
-    return complex(roots.values[mode]), roots.right_vectors[:, mode]
 
 
 def _scaled_onto(motion: Motion, measured: Motion, hertz: float) -> Motion:

@@ -20,7 +20,7 @@ from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
 if TYPE_CHECKING:
     import pandas as pd
 
-    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.structure import ReducedModel
 else:
@@ -87,9 +87,7 @@ def median_deviation_db(fit: ModalFit, model: ReducedModel, gains: FloatArray | 
     float
         Median over all lines above their noise, beside one factor that all FRFs share, dB; 0 where there is none.
     """
-    s: ComplexArray = np.asarray(2j * np.pi * fit.frequency_hz)
-    measured = np.abs(fit.model(s))
-    is_heard = measured > fit.value_std
+    s, measured, is_heard = _heard(fit)
     if not is_heard.any():
         return 0.0
     values = np.abs(compute_frfs(model, fit.labels, s) * (1.0 if gains is None else gains))[is_heard]
@@ -97,10 +95,16 @@ def median_deviation_db(fit: ModalFit, model: ReducedModel, gains: FloatArray | 
     return float(np.median(np.abs(off_db - np.median(off_db))))
 
 
+def _heard(fit: ModalFit) -> tuple[ComplexArray, FloatArray, BoolArray]:
+    """Lines, rad/s, magnitudes of the fitted FRFs there, and which of them stand above their noise."""
+    s: ComplexArray = np.asarray(2j * np.pi * fit.frequency_hz)
+    measured = np.abs(fit.model(s))
+    return s, measured, measured > fit.value_std
+
+
 def _noise_db(fit: ModalFit) -> float:
     """Median of the noise of the fitted FRFs, on the lines that stand above it, dB."""
-    measured = np.abs(fit.model(np.asarray(2j * np.pi * fit.frequency_hz)))
-    is_heard = measured > fit.value_std
+    _, measured, is_heard = _heard(fit)
     return float(np.median(DB * fit.value_std[is_heard] / measured[is_heard])) if is_heard.any() else 0.0
 
 

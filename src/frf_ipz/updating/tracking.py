@@ -93,15 +93,13 @@ class TargetRoots:
         """
         return np.array([self.rows[number][1] for number in self.frf[targets].tolist()])
 
-    def every_zero(
-        self, frfs: list[tuple[int, IntArray]], mass: FloatArray, damping: FloatArray, stiffness: FloatArray
-    ) -> list[Roots]:
+    def every_zero(self, frfs: list[int], mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> list[Roots]:
         """Compute all zeros of some FRFs.
 
         Parameters
         ----------
-        frfs : list of (int, int array)
-            Numbers of the FRFs, and anything.
+        frfs : list of int
+            Numbers of the FRFs.
         mass, damping, stiffness : (r, r) array
             The model.
 
@@ -112,7 +110,7 @@ class TargetRoots:
         """
         if not frfs:
             return []
-        pairs = [self.rows[number] for number, _ in frfs]
+        pairs = [self.rows[number] for number in frfs]
         outputs, inputs = (np.array([pair[side] for pair in pairs]) for side in range(2))
         return every_damped_zero(mass, damping, stiffness, outputs, inputs)
 
@@ -214,7 +212,7 @@ def nominal_roots(
         roots, found = targets.near(undamped_form(mass, stiffness), -(computed[zeros] ** 2), zeros)
         logs = np.log(np.abs(computed[zeros]))
         found &= np.abs(logs - 0.5 * np.log(np.abs(roots.values) + np.finfo(float).tiny)) < NEAR
-        for number, members in _lost(targets, zeros, found):
+        for number, members in _lost(targets, zeros, found).items():
             every = undamped_zeros(mass, stiffness, *targets.rows[number])
             _put(roots, members, every.take(_assign(distance(zeros[members], every))))
         groups.append((zeros, roots))
@@ -248,7 +246,7 @@ def track(targets: TargetRoots, before: TrackedRoots, mass: FloatArray, stiffnes
         start = old.values + np.sum(old.left_vectors * force, axis=0) / old.slope
         new, found = targets.near(undamped_form(mass, stiffness), start, indices)
         found &= _own_overlap(old, new, mass, new.slope) > SAME_ROOT
-        for number, members in _lost(targets, indices, found):
+        for number, members in _lost(targets, indices, found).items():
             every = undamped_zeros(mass, stiffness, *targets.rows[number])
             _put(new, members, every.take(_assign(-_overlap(old.take(members), every, mass, every.slope))))
         groups.append((indices, new))
@@ -289,7 +287,8 @@ def with_damping(
         new, found = targets.near(damped_form(mass, damping, stiffness), start, indices)
         found &= (new.values.imag > 0) & (_own_overlap(old, new, mass, new.slope / (2 * new.values)) > SAME_ROOT)
         lost = _lost(targets, indices, found)
-        for (_, members), roots in zip(lost, targets.every_zero(lost, mass, damping, stiffness), strict=True):
+        zeros = targets.every_zero(list(lost), mass, damping, stiffness)
+        for members, roots in zip(lost.values(), zeros, strict=True):
             every = upper_of(roots)
             overlap = _overlap(old.take(members), every, mass, every.slope / (2 * every.values))
             _put(new, members, every.take(_assign(-overlap)))
@@ -332,16 +331,17 @@ def nearest_roots(
         found &= np.abs(roots.values - reference[zeros]) < UNMOVED * np.abs(reference[zeros])
         values[zeros] = np.where(found, roots.values, 0.0)
         lost = _lost(targets, zeros, found)
-        for (_, members), every in zip(lost, targets.every_zero(lost, mass, damping, stiffness), strict=True):
+        of_lost = targets.every_zero(list(lost), mass, damping, stiffness)
+        for members, every in zip(lost.values(), of_lost, strict=True):
             values[zeros[members]] = 0.0
             assign(zeros[members], every.values)
     return values
 
 
-def _lost(targets: TargetRoots, zeros: IntArray, found: BoolArray) -> list[tuple[int, IntArray]]:
+def _lost(targets: TargetRoots, zeros: IntArray, found: BoolArray) -> dict[int, IntArray]:
     """FRFs with a zero that was not found, and where their zeros stand."""
     frf = targets.frf[zeros]
-    return [(int(number), np.flatnonzero(frf == number)) for number in np.unique(frf[~found])]
+    return {int(number): np.flatnonzero(frf == number) for number in np.unique(frf[~found])}
 
 
 def _put(roots: Roots, members: IntArray, others: Roots) -> None:

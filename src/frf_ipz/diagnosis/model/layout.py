@@ -162,6 +162,27 @@ def make_shift_rows(model: StructuralModel, dof: AnyDof) -> dict[str, FloatArray
     return {axis: dof.sign * _shift_row(model, dof, axis) for axis in axes}
 
 
+def list_turns(model: StructuralModel, dof: AnyDof) -> tuple[Dof, ...]:
+    """List the DOFs of the same node towards which a direction may be turned.
+
+    Parameters
+    ----------
+    model : StructuralModel
+        The model.
+    dof : Dof or PortDof
+        Of a sensor or an excited point.
+
+    Returns
+    -------
+    tuple of Dof
+        None where the node moves in one direction only.
+    """
+    if not isinstance(dof, Dof) or dof.direction not in AXES:
+        return ()  # the direction of a port is defined by its weights
+    others = (Dof(dof.node, axis) for axis in AXES if axis != dof.direction)
+    return tuple(other for other in others if other in model.full_indices)
+
+
 def make_turn_rows(model: StructuralModel, dof: AnyDof) -> dict[str, FloatArray]:
     """How the motion at a DOF changes with its direction.
 
@@ -175,13 +196,9 @@ def make_turn_rows(model: StructuralModel, dof: AnyDof) -> dict[str, FloatArray]
     Returns
     -------
     dict of str to (n_all,) array
-        For each direction towards which it may be turned, weights of all DOFs in the derivative, 1/rad; none where the
-        node moves in one direction only.
+        For each direction of `list_turns`, weights of all DOFs in the derivative, 1/rad.
     """
-    if not isinstance(dof, Dof) or dof.direction not in AXES:
-        return {}  # the direction of a port is defined by its weights
-    others = [axis for axis in AXES if axis != dof.direction and Dof(dof.node, axis) in model.full_indices]
-    return {axis: make_motion_row(model, Dof(dof.node, axis)) for axis in others}
+    return {other.direction: make_motion_row(model, other) for other in list_turns(model, dof)}
 
 
 def shear_slope_at_force(model: StructuralModel, dof: AnyDof) -> float:

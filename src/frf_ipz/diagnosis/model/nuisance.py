@@ -30,6 +30,7 @@ import numpy as np
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
 from frf_ipz.diagnosis.model.layout import (
     AXES,
+    list_turns,
     make_motion_row,
     make_shift_rows,
     make_turn_rows,
@@ -387,7 +388,7 @@ def make_nuisance_prior(basis: Basis, layout: Layout, options: DiagnoseOptions) 
 
 def _list_turns(basis: Basis, layout: Layout) -> tuple[str, ...]:
     """List the directions towards which sensors or impacts may be turned."""
-    towards = {axis for dof in layout.dofs for axis in make_turn_rows(basis.model, dof)}
+    towards = {other.direction for dof in layout.dofs for other in list_turns(basis.model, dof)}
     return tuple(TURNED + axis for axis in AXES if axis in towards)
 
 

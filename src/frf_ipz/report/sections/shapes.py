@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from frf_ipz.plotting.wording import counted, number
 from frf_ipz.report.section import Form, Section
-from frf_ipz.runs.shapes import draw_shape, draw_structure, mode_shape
+from frf_ipz.runs.shapes import draw_shape, draw_structure, mode_shapes
 
 if TYPE_CHECKING:
     from frf_ipz.runs.results import Results
@@ -31,7 +31,7 @@ def build(run: Results) -> Section | None:
     """
     if run.fit is None or not run.fit.n_modes:
         return None
-    shapes = [mode_shape(run, mode) for mode in range(run.fit.n_modes)]
+    shapes = mode_shapes(run)
     structure = draw_structure(run, shapes[0].measured_dofs)
     drawn: list[dict[str, Any]] = []
     n_moves = 0

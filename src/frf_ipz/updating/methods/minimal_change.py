@@ -22,7 +22,7 @@ from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
 from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble
 from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, frame_of, modal_frame, modal_parameters
-from frf_ipz.updating.minimal_change.outliers import contradicted_targets, unmet_targets
+from frf_ipz.updating.minimal_change.outliers import EXCLUDED_STD, contradicted_targets, unmet_targets
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase, log_moduli
 from frf_ipz.updating.pairing_again import ROUNDS
 from frf_ipz.updating.parameters import ParameterBasis, generic_basis
@@ -41,7 +41,6 @@ else:
     pd = import_late("pandas")
 
 SMALLEST_NOISE = 1e-6  # relative standard deviation of a frequency: none is measured better
-EXCLUDED_STD = 1.0  # relative standard deviation of an excluded target
 OF_DAMPING = 1.0  # change of the logarithm of a modulus by damping, from which damping makes a root
 UNKNOWN_STD = 1e15  # relative, of what is no target: however far its root runs, and with it what moves it
 STEPS_BACK = 16  # to the nominal model: so many that roots keep the greater part of their vectors over each

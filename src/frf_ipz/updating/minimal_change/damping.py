@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.numerics.low_rank import factorise, of_entries
+from frf_ipz.numerics.low_rank import PAIRS_AT_ONCE, factorise, of_entries
 from frf_ipz.rational import damping_ratio
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, unwhiten
@@ -34,7 +34,6 @@ NO_DAMPING = 1e-3  # of the typical rate: a model with less states no damping fo
 POLE_SLACK = 1e-3  # relative standard deviation of a pole's real part that no damping matrix explains
 ZERO_SLACK = 0.02  # the same of a zero, which depends on mode shapes too, and these are not known better
 MOST_COUPLED_MODES = 48  # the lowest: as many as may change each other's stiffness; higher ones lie far above the band
-ROWS_AT_ONCE = 256  # of the derivatives: they stay in the cache
 INDEFINITE = 1e-9  # part of the largest rate below which a negative eigenvalue is rounding
 
 
@@ -196,8 +195,8 @@ class DampingPhase:
             # by each entry of the damping matrix: -s y x^T / slope; every parameter is a sum over entries
             x, y = roots.right_vectors, roots.left_vectors * (roots.values / roots.slope)
             by_mode = (y * (modal_damping @ x) + x * (modal_damping @ y)).real.T / 2
-            for first in range(0, len(indices), ROWS_AT_ONCE):
-                part = slice(first, first + ROWS_AT_ONCE)
+            for first in range(0, len(indices), PAIRS_AT_ONCE):
+                part = slice(first, first + PAIRS_AT_ONCE)
                 rows = np.empty((len(indices[part]), len(theta)))
                 rows[:, :1] = by_mode[part].sum(axis=1, keepdims=True)
                 rows[:, 1 : ends[1]] = by_mode[part]

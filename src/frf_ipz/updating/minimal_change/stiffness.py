@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.numerics.low_rank import LowRankMatrices
+from frf_ipz.numerics.low_rank import PAIRS_AT_ONCE, LowRankMatrices
 from frf_ipz.updating.minimal_change.modal_frame import is_negative
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
 from frf_ipz.updating.target_noise import TargetNoise
@@ -19,7 +19,6 @@ from frf_ipz.updating.tracking import TargetRoots, TrackedRoots, nominal_roots, 
 
 POLE_SLACK = 1e-7  # relative standard deviation of a true pole that a reduced model cannot express: it has its modes
 ZERO_SLACK = 1e-5  # the same of a zero, which depends on the modes beyond as well
-ROWS_AT_ONCE = 256  # of the derivatives: they stay in the cache
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -156,8 +155,8 @@ class StiffnessPhase:
         for indices, roots in tracked.groups:
             left = roots.left_vectors * (0.5 / (roots.slope * roots.values))
             by_mass = left * -roots.values if self.changes_mass else left
-            for first in range(0, len(indices), ROWS_AT_ONCE):
-                part = slice(first, first + ROWS_AT_ONCE)
+            for first in range(0, len(indices), PAIRS_AT_ONCE):
+                part = slice(first, first + PAIRS_AT_ONCE)
                 change = self.by_stiffness.forms(left[:, part], roots.right_vectors[:, part])
                 if self.changes_mass:
                     self.by_mass.add_forms(change, by_mass[:, part], roots.right_vectors[:, part])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Reading, list_neighbouring_nodes
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
-from frf_ipz.diagnosis.model.layout import make_turn_rows
+from frf_ipz.diagnosis.model.layout import list_turns
 from frf_ipz.diagnosis.model.motion import Motion
 from frf_ipz.dofs import Dof
 
@@ -37,9 +37,9 @@ class SensorMisplaced(Effect):
             if candidate.direction == dof.direction and candidate.node != dof.node
         ]
         turned = [
-            Location(channels=(channel,), nodes=(dof.node,), directions=(axis,))
+            Location(channels=(channel,), nodes=(other.node,), directions=(other.direction,))
             for channel, dof in staying
-            for axis in make_turn_rows(context.model, dof)
+            for other in list_turns(context.model, dof)
         ]
         return [*elsewhere, *turned]
 

@@ -33,8 +33,10 @@ def measure_noise_levels(observations: Observations) -> Observations:
     Observations
         The same with the levels of their noise; without them where records do not show it.
     """
+    if observations.kind != "hammer":
+        return observations
     powers = [_measure_powers(record, observations.band_hz[1]) for record in observations.records]
-    if observations.kind != "hammer" or any(min(map(min, of_record.values()), default=0) <= 0 for of_record in powers):
+    if any(min(map(min, of_record.values()), default=0) <= 0 for of_record in powers):
         return observations
     names = dict.fromkeys(name for of_record in powers for name in of_record)
     earlier, later = (
