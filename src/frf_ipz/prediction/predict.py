@@ -27,9 +27,10 @@ from frf_ipz.prediction.zeros import predicted_zeros
 from frf_ipz.updating.updated_model import UpdatedModel
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from frf_ipz.structure import ReducedModel
+    from frf_ipz.updating.expansion import ShapeExpansion
 
 BAND = (0.05, 0.95)
 
@@ -197,11 +198,8 @@ def _magnitude_bands(
         centre = as_ensemble(updated, ensemble.lowest_rad_s)
         sizes = frf_sizes(updated, labels, s, centre) if error is not None and labels else None
         gains, powers = np.abs(updated.scale.gains(tuple(labels))), np.array([label.quantity.power for label in labels])
-        rows = frf_rows(updated, labels)
-        due = _due_spread(measured, updated, labels)
-        centres = centre.receptances(*rows, s)
-        for (lines, frfs, block), (_, _, middle) in zip(ensemble.receptances(*rows, s), centres, strict=True):
-            values = (middle + due[frfs] * (block - middle)) * s[lines, None] ** powers[frfs]
+        for lines, frfs, block in _receptances(measured, updated, (ensemble, centre), labels, s):
+            values = block * s[lines, None] ** powers[frfs]
             if error is not None and sizes is not None:
                 errors = error.draw(len(values))[:, None, None]
                 values = values + errors * (error.ratio[lines, None] * sizes[lines, frfs])
@@ -211,11 +209,26 @@ def _magnitude_bands(
     return bands[0], bands[1]
 
 
-def _due_spread(measured: Measured, updated: UpdatedModel, labels: Sequence[FrfLabel]) -> FloatArray:
-    """Share of the ensemble's spread that is due in each FRF: the larger of those at its two ends."""
-    expansion = updated.expansion
+def _receptances(
+    measured: Measured,
+    updated: UpdatedModel,
+    models: tuple[ModelEnsemble, ModelEnsemble],
+    labels: Sequence[FrfLabel],
+    s: ComplexArray,
+) -> Iterator[tuple[slice, slice, ComplexArray]]:
+    """Receptances of an ensemble, some at a time; of measured shapes with the spread about its centre that is due."""
+    (ensemble, centre), rows, expansion = models, frf_rows(updated, labels), updated.expansion
     if expansion is None:
-        return np.ones(len(labels))
+        yield from ensemble.receptances(*rows, s)
+        return
+    due = _due_spread(measured, expansion, labels)
+    centres = centre.receptances(*rows, s)
+    for (lines, frfs, block), (_, _, middle) in zip(ensemble.receptances(*rows, s), centres, strict=True):
+        yield lines, frfs, middle + due[frfs] * (block - middle)
+
+
+def _due_spread(measured: Measured, expansion: ShapeExpansion, labels: Sequence[FrfLabel]) -> FloatArray:
+    """Share of the ensemble's spread that is due in each FRF: the larger of those at its two ends."""
     outputs = {label.output_dof.unsigned for label in measured.connections}
     inputs = {label.input_dof.unsigned for label in measured.connections}
 

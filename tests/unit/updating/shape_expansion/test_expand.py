@@ -85,6 +85,20 @@ def test_a_sensor_is_predicted_where_no_change_of_matrices_meets_the_others(left
     assert np.median(20 * np.log10(high / low)) < 6.0
 
 
+def test_bands_are_as_wide_as_what_is_due_between_and_beyond_measured_points(left_out, expanded):
+    fit, *_ = left_out
+    lines = 2j * np.pi * np.linspace(*BAND_HZ, 50)
+
+    def widths(node, share):
+        expansion = replace(expanded.expansion, inner_nodes=(29,), inner_spread=share)
+        labels = labels_of([frf_ipz.Dof(node, "z")])
+        low, high = frf_ipz.band_of_magnitudes(fit, replace(expanded, expansion=expansion), labels=labels, s=lines)
+        return np.log(high / low)
+
+    assert np.median(widths(29, 0.5) / widths(29, 1.0)) < 0.9
+    np.testing.assert_allclose(widths(33, 0.5), widths(33, 1.0))
+
+
 def test_the_update_alone_is_far_off(left_out):
     fit, reduced_model, *frfs = left_out
     options = frf_ipz.UpdateOptions(expand=False, ensemble=0)
