@@ -8,12 +8,15 @@ order. ``z`` is the s of a damped model, or the squared frequency of an undamped
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from frf_ipz.numerics.pencils import Roots, damped_zeros, undamped_poles
+from frf_ipz.numerics.pencils import Roots, damped_zeros, undamped_poles, undamped_zeros
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 Numbers: TypeAlias = ComplexArray | FloatArray
 STEPS = 30  # of Newton's method; from near, four are enough
@@ -100,10 +103,12 @@ class PoleForm:
         order = len(self.mass)
         right, left = np.zeros((order, len(zeros)), complex), np.zeros((order, len(zeros)), complex)
         slope, exact = np.zeros(len(zeros), complex), np.zeros(len(zeros), bool)
-        for first in range(0, len(zeros), ROWS_AT_ONCE):
-            part = slice(first, first + ROWS_AT_ONCE)
-            z, sensors, forces = zeros[part], outputs[part], inputs[part]
-            by_force, by_sensor = forces @ self.shapes, sensors @ self.shapes
+        for part in self._alike(zeros):
+            sensors, forces = outputs[part], inputs[part]
+            z: Numbers = zeros[part]
+            if not np.iscomplexobj(self.poles) and not z.imag.any():
+                z = z.real
+            by_force, by_sensor = _times(forces, self.shapes), _times(sensors, self.shapes)
             residues, double = self._residues(sensors, forces)
             at = _beside_pole(residues, double, self.poles, z)
             pole = (np.arange(len(z)), at.nearest)
@@ -121,28 +126,43 @@ class PoleForm:
             right[:, part], left[:, part], slope[part] = x, y, -at.rest - gap * at.slope
         return Roots(values=zeros, right_vectors=right, left_vectors=left, slope=slope), exact
 
+    def _alike(self, zeros: ComplexArray) -> Iterator[IntArray]:
+        """Give some at a time: those of an undamped model that are real, which take real numbers, then the others."""
+        is_real = (zeros.imag == 0.0) & (not np.iscomplexobj(self.poles))
+        for places in (np.flatnonzero(is_real), np.flatnonzero(~is_real)):
+            for first in range(0, len(places), ROWS_AT_ONCE):
+                yield places[first : first + ROWS_AT_ONCE]
+
     def _residues(self, outputs: FloatArray, inputs: FloatArray) -> tuple[Numbers, FloatArray]:
-        residues = (outputs @ self.shapes) * (inputs @ self.shapes) / self.slope
+        residues = _times(outputs, self.shapes) * _times(inputs, self.shapes) / self.slope
         return residues, np.sum((outputs @ self.rigid) * (inputs @ self.rigid), axis=1)
 
     def _motion(
-        self, loads: FloatArray, by_load: Numbers, at: _BesidePole, scale: Numbers, own: Numbers, z: ComplexArray
-    ) -> ComplexArray:
+        self, loads: FloatArray, by_load: Numbers, at: _BesidePole, scale: Numbers, own: Numbers, z: Numbers
+    ) -> Numbers:
         """Motion under scaled loads, (r, n), with that of the nearest pole given."""
         by_pole = scale[:, None] * by_load / self.slope / at.distance
         np.put_along_axis(by_pole, at.nearest[:, None], own[:, None], axis=1)
-        motion = self.shapes @ by_pole.T
+        motion = _times(self.shapes, by_pole.T)
         if not self.rigid.size:
-            return np.asarray(motion)
-        return np.asarray(motion + self.rigid @ (scale[:, None] * (loads @ self.rigid) / z[:, None] ** 2).T)
+            return motion
+        return motion + self.rigid @ (scale[:, None] * (loads @ self.rigid) / z[:, None] ** 2).T
 
-    def _is_exact(self, motion: ComplexArray, loads: FloatArray, z: ComplexArray) -> BoolArray:
+    def _is_exact(self, motion: Numbers, loads: FloatArray, z: Numbers) -> BoolArray:
+        elastic, inertial = _times(self.stiffness, motion), _times(self.mass, motion)
         if self.damping is None:
-            force = z * (self.mass @ motion) - self.stiffness @ motion
+            force = z * inertial - elastic
         else:
-            force = z**2 * (self.mass @ motion) + z * (self.damping @ motion) + self.stiffness @ motion
-        size = np.linalg.norm(self.stiffness @ motion, axis=0) + np.linalg.norm(loads, axis=1)
+            force = z * (z * inertial + _times(self.damping, motion)) + elastic
+        size = np.linalg.norm(elastic, axis=0) + np.linalg.norm(loads, axis=1)
         return np.asarray(np.linalg.norm(force - loads.T, axis=0) < SMALL_RESIDUE * size)
+
+
+def _times(left: Numbers, right: Numbers) -> Numbers:
+    """Multiply; of a real and a complex matrix without making the real one complex."""
+    if np.iscomplexobj(left) or not np.iscomplexobj(right):
+        return left @ right
+    return cast("Numbers", (left @ np.ascontiguousarray(right).view(np.float64)).view(np.complex128))
 
 
 def undamped_form(mass: FloatArray, stiffness: FloatArray) -> PoleForm:
@@ -324,7 +344,27 @@ def every_damped_zero(
     return found
 
 
-def _damped_from_undamped(undamped: PoleForm, damped: PoleForm, output: FloatArray, force: FloatArray) -> Roots | None:
+def every_undamped_zero(form: PoleForm, output: FloatArray, force: FloatArray) -> Roots:
+    """All squared zeros of an FRF of an undamped model.
+
+    Parameters
+    ----------
+    form : PoleForm
+        The model by its poles.
+    output, force : (r,) array
+        Rows of sensor and excitation.
+
+    Returns
+    -------
+    Roots
+        As `undamped_zeros` gives them.
+    """
+    roots = _from_poles(form, output, force)
+    return undamped_zeros(form.mass, form.stiffness, output, force) if roots is None else roots
+
+
+def _from_poles(undamped: PoleForm, output: FloatArray, force: FloatArray) -> Roots | None:
+    """Squared zeros from the poles; None where they do not give each to rounding."""
     squares = _undamped_zeros(undamped, output, force)
     if squares is None:
         return None
@@ -333,8 +373,14 @@ def _damped_from_undamped(undamped: PoleForm, damped: PoleForm, output: FloatArr
     if not is_found.all() or _merge(squares):
         return None
     roots, exact = undamped.roots(outputs, inputs, squares)
-    if not exact.all() or damped.damping is None or not roots.slope.all():  # a double zero has no slope
+    return roots if exact.all() and roots.slope.all() else None  # a double zero has no slope
+
+
+def _damped_from_undamped(undamped: PoleForm, damped: PoleForm, output: FloatArray, force: FloatArray) -> Roots | None:
+    roots = _from_poles(undamped, output, force)
+    if roots is None or damped.damping is None:
         return None
+    squares = roots.values
     shift = np.sum(roots.left_vectors * (damped.damping @ roots.right_vectors), axis=0) / (2 * roots.slope)
     s = 1j * np.sqrt(squares.astype(complex))
     s = np.where(s.imag < 0, -s, s)

@@ -25,11 +25,12 @@ pivots of the information (LAPACK's ``pstrf``), and keep their prior.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import cho_solve, cholesky, lapack
+from scipy.linalg import blas, cho_solve, lapack
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
 
@@ -46,7 +47,9 @@ MAX_DEVIATION = 6.0  # standard deviations of a scale's prior within which the s
 LARGEST_SCALE_STEP = 2.0  # of the logarithm of a scale in one step
 FLAT = 1e-4  # of the logarithm of the evidence: what a further step would gain is nothing (1e-2 moves printed digits)
 MAX_HALVINGS = 10
+CONTRACTING = 0.25  # of the gain of the step before: beyond it a curvature from farther away costs steps
 ROWS_AT_ONCE = 4096
+ROWS_OF_A_TILE = 128  # when a matrix is mirrored: both tiles stay in the cache
 ALIKE = 1e-4  # relative, of the noise of each datum: none is known as well
 LARGEST_SHARES = 1e3  # in a mixture: what rounding may grow by
 UNTOLD = 1e-4  # of the prior's information: a deviation that so few data narrow is the prior's to four digits
@@ -80,15 +83,13 @@ class Linearised:
 
     Parameters
     ----------
-    data : (n,) array
-        d, in units of the slack.
-    parts : tuple of (n, m_i) arrays
-        Sensitivity to each prior term's unit normal numbers, for a standard deviation of 1; or to those combinations
-        of them that the data tell of.
+    joined : (n, c + k + 1) array
+        Sensitivity to the errors that all data share; that to each prior term's unit normal numbers, for a standard
+        deviation of 1, or to those combinations of them that the data tell of; and d: all in units of the slack.
+    ends : tuple of int
+        Where the columns of the shared errors end, and of each term.
     bases : tuple of (k_i, m_i) arrays, or None
         These combinations, orthonormal; None where they are the numbers themselves.
-    common : (n, c) array
-        Sensitivity to the errors that all data share.
     level : (n,) array
         Variance for a slack of 0.
     log_slack : float
@@ -103,15 +104,44 @@ class Linearised:
         Weights of the data, and the sums of products of sensitivity and data with them, as far as they are known.
     """
 
-    data: FloatArray
-    parts: tuple[FloatArray, ...]
+    joined: FloatArray
+    ends: tuple[int, ...]
     bases: tuple[FloatArray | None, ...]
-    common: FloatArray
     level: FloatArray
     axes: tuple[FloatArray, ...]
     places: tuple[IntArray, ...]
     slack: FloatArray
     sums: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
+
+    @property
+    def data(self) -> FloatArray:
+        """d, in units of the slack, (n,)."""
+        return np.asarray(self.joined[:, -1])
+
+    @property
+    def common(self) -> FloatArray:
+        """Sensitivity to the errors that all data share, (n, c)."""
+        return np.asarray(self.joined[:, : self.ends[0]])
+
+    @property
+    def parts(self) -> tuple[FloatArray, ...]:
+        """Sensitivity to the combinations of each term, (n, m_i)."""
+        return tuple(self.joined[:, first:end] for first, end in pairwise(self.ends))
+
+    def factors(self, scales: FloatArray) -> FloatArray:
+        """Give the standard deviation of each column.
+
+        Parameters
+        ----------
+        scales : (t,) array
+            Standard deviations of the terms.
+
+        Returns
+        -------
+        (c + k,) array
+            1 for shared errors.
+        """
+        return np.concatenate([np.ones(self.ends[0]), np.repeat(scales, np.diff(self.ends))])
 
     def rotated(self, rows: FloatArray) -> FloatArray:
         """Express numbers of the data in these coordinates.
@@ -155,24 +185,6 @@ class Linearised:
         information = np.eye(len(shared)) + weighted.T @ self.common
         return whole - float(shared @ np.linalg.solve(information, shared))
 
-    def columns(self, scales: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
-        """Give the sensitivity to shared errors and scaled parameters, some rows at a time.
-
-        Parameters
-        ----------
-        scales : (t,) array
-            Standard deviations of the terms.
-
-        Yields
-        ------
-        slice, (m, c + k) array
-            Rows, and their sensitivity.
-        """
-        for first in range(0, len(self.data), ROWS_AT_ONCE):
-            rows = slice(first, first + ROWS_AT_ONCE)
-            scaled = [scale * part[rows] for scale, part in zip(scales, self.parts, strict=True)]
-            yield rows, np.hstack([self.common[rows], *scaled])
-
     def blocks(self) -> Iterator[tuple[slice, IntArray, FloatArray]]:
         """Give the blocks of the noise.
 
@@ -199,9 +211,10 @@ class Linearised:
         (m,) int array, (m, k) array
             Which data, and their sensitivity.
         """
+        columns = slice(self.ends[0], self.ends[-1])
+        factors = self.factors(scales)[columns]
         for rows, place, vectors in self.blocks():
-            scaled = [scale * part[rows] for scale, part in zip(scales, self.parts, strict=True)]
-            yield place, self.slack[place, None] * (vectors @ np.hstack(scaled))
+            yield place, (self.slack[place, None] * vectors) @ self.joined[rows, columns] * factors
 
     def whole(self, combined: FloatArray) -> FloatArray:
         """Turn values of the combinations into those of all whitened parameters.
@@ -216,8 +229,7 @@ class Linearised:
         (..., k) array
             Of the parameters.
         """
-        ends = np.cumsum([part.shape[1] for part in self.parts])[:-1]
-        pieces = np.split(combined, ends, axis=-1)
+        pieces = np.split(combined, np.array(self.ends[1:-1], int) - self.ends[0], axis=-1)
         return np.concatenate(
             [p if basis is None else p @ basis.T for p, basis in zip(pieces, self.bases, strict=True)], axis=-1
         )
@@ -258,11 +270,14 @@ class Linearised:
         (c + k + 1, c + k + 1) array
             Of the sensitivity to shared errors and scaled parameters; last of the data.
         """
-        sizes = [part.shape[1] for part in self.parts]
-        factors = np.concatenate([np.ones(self.common.shape[1]), np.repeat(scales, sizes), np.ones(1)])
-        return np.asarray(self._sum(weights, weights if beside is None else beside) * factors[:, None] * factors)
+        factors = np.append(self.factors(scales), 1.0)
+        total = self._sum(weights, weights if beside is None else beside)
+        total *= factors[:, None]
+        total *= factors
+        return total
 
     def _sum(self, weights: FloatArray, beside: FloatArray) -> FloatArray:
+        """Mix known sums, or form another; the caller may change what it gets."""
         if self.sums:
             known = np.stack([others / beside for others, _ in self.sums], axis=1)
             sizes = known.max(axis=0)
@@ -272,11 +287,11 @@ class Linearised:
             if is_alike and np.abs(shares).sum() < LARGEST_SHARES:
                 mixed = np.zeros_like(self.sums[0][1])
                 for share, (_, total) in zip(shares / sizes, self.sums, strict=True):
-                    mixed += share * total
+                    blas.daxpy(total.ravel(), mixed.ravel(), a=share)
                 return mixed
-        total = _sum_of_products(self.common, self.parts, self.data, weights)
+        total = _sum_of_products(self.joined, weights)
         self.sums.append((weights, total))
-        return total
+        return total.copy()
 
     def information(self, scales: FloatArray, factor: float) -> tuple[FloatArray, FloatArray]:
         """Give the information of shared errors and parameters, with that of their prior.
@@ -298,7 +313,11 @@ class Linearised:
         products = self.products(1 / (self.level + factor**2), scales)
         information = products[:-1, :-1].copy()
         information[np.diag_indices_from(information)] += 1.0
-        return cholesky(information, check_finite=False), products[:-1, -1]
+        # symmetric: what LAPACK takes for its columns are the rows, so that nothing is copied
+        root, info = lapack.dpotrf(information.T, lower=0, clean=1, overwrite_a=1)
+        if info:
+            raise np.linalg.LinAlgError("the information of an update is not positive definite")
+        return np.asarray(root), products[:-1, -1]
 
 
 def linearise(
@@ -341,24 +360,31 @@ def linearise(
         places.append(part)
     turned = tuple(axes), tuple(places), units
     level = np.concatenate(levels) if levels else np.zeros(0)
-    turned_parts = tuple(_rotated(*turned, part) for part in parts)
-    common, values_of_data = _rotated(*turned, noise.common), _rotated(*turned, data)
-    bases: tuple[FloatArray | None, ...] = (None,) * len(turned_parts)
+    pieces = [_rotated(*turned, noise.common), *(_rotated(*turned, part) for part in parts)]
+    ends = tuple(np.cumsum([piece.shape[1] for piece in pieces]).tolist())
+    joined = np.hstack([*pieces, _rotated(*turned, data)[:, None]])
+    del pieces  # large
+    bases: tuple[FloatArray | None, ...] = (None,) * (len(ends) - 1)
     sums: list[tuple[FloatArray, FloatArray]] = []
-    if combining and turned_parts:
-        stds = np.ones(len(turned_parts)) if scales is None else scales
-        total = _sum_of_products(common, turned_parts, values_of_data, 1 / level)
-        ends = np.cumsum([common.shape[1], *(part.shape[1] for part in turned_parts)])
-        columns = [slice(first, end) for first, end in pairwise(ends.tolist())]
+    if combining and bases:
+        total = _sum_of_products(joined, 1 / level)
+        columns = [slice(first, end) for first, end in pairwise(ends)]
+        stds = np.ones(len(columns)) if scales is None else scales
         bases = tuple(_told(total[at, at] * std**2) for at, std in zip(columns, stds, strict=False))
-        turned_parts = tuple(p if b is None else p @ b for p, b in zip(turned_parts, bases, strict=True))
+        if any(basis is not None for basis in bases):
+            combined = [
+                joined[:, at] if basis is None else joined[:, at] @ basis
+                for at, basis in zip(columns, bases, strict=True)
+            ]
+            joined = np.hstack([joined[:, : ends[0]], *combined, joined[:, -1:]])
+            ends = tuple(np.cumsum([ends[0], *(piece.shape[1] for piece in combined)]).tolist())
+            total = _combined(total, columns, bases)
         if np.isfinite(total).all():
-            sums.append((1 / level, _combined(total, columns, bases)))
+            sums.append((1 / level, total))
     return Linearised(
-        data=values_of_data,
-        parts=turned_parts,
+        joined=joined,
+        ends=ends,
         bases=bases,
-        common=common,
         level=level,
         axes=turned[0],
         places=turned[1],
@@ -390,44 +416,30 @@ def with_more_noise(linear: Linearised, noise: TargetNoise, datum: int) -> Linea
     )
     units = linear.slack[place]
     values, new_vectors = np.linalg.eigh(block / np.outer(units, units))
-    turn = new_vectors.T @ vectors
-
-    def turned(before: FloatArray) -> FloatArray:
-        after = before.copy()
-        after[rows] = turn @ before[rows]
-        return after
-
+    joined = linear.joined.copy()
+    joined[rows] = new_vectors.T @ vectors @ linear.joined[rows]
     level = linear.level.copy()
     level[rows] = np.maximum(values, np.finfo(float).tiny)
     changed = replace(
         linear,
-        data=turned(linear.data),
-        parts=tuple(turned(part) for part in linear.parts),
-        common=turned(linear.common),
+        joined=joined,
         level=level,
         axes=tuple(new_vectors if axes is vectors else axes for axes in linear.axes),
         sums=[],
     )
-
-    def own(each: Linearised) -> FloatArray:
-        parts = tuple(part[rows] for part in each.parts)
-        return _sum_of_products(each.common[rows], parts, each.data[rows], 1 / each.level[rows])
-
-    total = linear.products(1 / linear.level, np.ones(len(linear.parts)))
-    changed.sums.append((1 / level, total - own(linear) + own(changed)))
+    total = linear.products(1 / linear.level, np.ones(len(linear.bases)))
+    total -= _sum_of_products(linear.joined[rows], 1 / linear.level[rows])
+    total += _sum_of_products(joined[rows], 1 / level[rows])
+    changed.sums.append((1 / level, total))
     return changed
 
 
-def _sum_of_products(
-    common: FloatArray, parts: tuple[FloatArray, ...], data: FloatArray, weights: FloatArray
-) -> FloatArray:
-    size = common.shape[1] + sum(part.shape[1] for part in parts) + 1
-    total = np.zeros((size, size))
+def _sum_of_products(joined: FloatArray, weights: FloatArray) -> FloatArray:
+    total = np.zeros((joined.shape[1],) * 2)
     for first in range(0, len(weights), ROWS_AT_ONCE):
         rows = slice(first, first + ROWS_AT_ONCE)
-        joined = np.hstack([common[rows], *(part[rows] for part in parts), data[rows, None]])
-        joined *= np.sqrt(weights[rows])[:, None]
-        total += joined.T @ joined
+        weighted = joined[rows] * np.sqrt(weights[rows])[:, None]
+        total += weighted.T @ weighted
     return total
 
 
@@ -479,12 +491,11 @@ def solve_step(linear: Linearised, scales: FloatArray, factor: float = 0.0) -> G
         The posterior.
     """
     root, right = linear.information(scales, factor)
-    n_common = linear.common.shape[1]
+    n_common = linear.ends[0]
     mean = cho_solve((root, False), right, check_finite=False)[n_common:]
     inverse_root = lapack.dtrtri(root)[0][n_common:]
-    error = linear.data.copy()
-    for rows, columns in linear.columns(scales):
-        error[rows] -= columns[:, n_common:] @ mean
+    columns = slice(n_common, linear.ends[-1])
+    error = linear.data - linear.joined[:, columns] @ (linear.factors(scales)[columns] * mean)
     return GaussianStep(
         mean=linear.whole(mean),
         misfit=linear._square(error, factor),
@@ -518,11 +529,10 @@ def distance_to_optimum(
     float
         Posterior standard deviations, over all directions together, whatever the number of data.
     """
-    now, n_common = linear.combined(whitened), linear.common.shape[1]
+    now, n_common = linear.combined(whitened), linear.ends[0]
     turned, weights = linear.rotated(error), 1 / (linear.level + factor**2)
-    right = np.zeros(len(step.root))
-    for rows, columns in linear.columns(scales):
-        right += columns.T @ (weights[rows] * (turned[rows] + columns[:, n_common:] @ now))
+    factors, columns = linear.factors(scales), linear.joined[:, : linear.ends[-1]]
+    right = factors * (columns.T @ (weights * (turned + columns[:, n_common:] @ (factors[n_common:] * now))))
     change = cho_solve((step.root, False), right, check_finite=False)[n_common:] - now
     beyond = float(np.sum((whitened - linear.whole(now)) ** 2))  # along combinations that no datum moves
     return float(np.sqrt(np.sum((step.root[n_common:, n_common:] @ change) ** 2) + beyond))
@@ -581,12 +591,18 @@ def most_contradicted(linear: Linearised, scales: FloatArray, limit: float, *, l
     weighted_error, explained = np.empty(len(weights)), np.empty(len(weights))
     data, own = np.empty(len(weights)), np.empty(len(weights))
     inverse_root = lapack.dtrtri(root)[0]
+    columns, factors = linear.joined[:, : linear.ends[-1]], linear.factors(scales)
+    error = weights * (linear.data - columns @ (factors * mean))
+    inverse_root *= factors[:, None]
+    first, seen = 0, np.zeros((0, len(mean)))
     for rows, place, vectors in linear.blocks():
-        columns = np.hstack(
-            [linear.common[rows], *(s * part[rows] for s, part in zip(scales, linear.parts, strict=True))]
-        )
-        weighted_error[place] = vectors @ (weights[rows] * (linear.data[rows] - columns @ mean))
-        explained[place] = np.sum((vectors @ (weights[rows, None] * (columns @ inverse_root))) ** 2, axis=1)
+        if rows.stop > first + len(seen):
+            first = rows.start
+            chunk = slice(first, max(rows.stop, first + ROWS_AT_ONCE))
+            seen = weights[chunk, None] * (columns[chunk] @ inverse_root)
+        mine = seen[rows.start - first : rows.stop - first]
+        weighted_error[place] = vectors @ error[rows]
+        explained[place] = np.sum((vectors @ mine) ** 2, axis=1)
         own[place] = vectors**2 @ weights[rows]
         data[place] = vectors @ linear.data[rows]
     remaining = np.maximum(own - explained, np.finfo(float).tiny)
@@ -632,12 +648,11 @@ def draw_posterior(
     prior = rng.standard_normal((count, len(step.mean)))
     chosen = linear.combined(prior)
     errors = linear.rotated(noise.draw(rng.standard_normal((count, len(linear.data)))).T)
-    n_common = linear.common.shape[1]
+    n_common = linear.ends[0]
     weights = 1 / (linear.level + factor**2)
-    right = np.zeros((len(step.root), count))
-    for rows, columns in linear.columns(scales):
-        pretended = columns[:, n_common:] @ chosen.T + errors[rows]
-        right += columns.T @ (weights[rows, None] * pretended)
+    factors, columns = linear.factors(scales)[:, None], linear.joined[:, : linear.ends[-1]]
+    pretended = columns[:, n_common:] @ (factors[n_common:] * chosen.T) + errors
+    right = factors * (columns.T @ (weights[:, None] * pretended))
     correction = cho_solve((step.root, False), right, check_finite=False)[n_common:]
     return np.asarray(step.mean + prior - linear.whole(correction.T))
 
@@ -667,28 +682,30 @@ def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: Fl
         return start
     search = _ScaleSearch(linear, terms, free, start)
     logs = np.clip(np.log(start)[free], search.low, search.high)
-    value, slope, curvature = search.evaluate(logs)
+    evidence = search.evaluate(logs)
+    curvature, gain_before = None, 0.0
     for _ in range(MAX_SCALE_STEPS):
-        held = ((logs <= search.low) & (slope > 0)) | ((logs >= search.high) & (slope < 0))
-        step = np.zeros(len(logs))
-        open_ones = np.flatnonzero(~held)
-        if len(open_ones):
-            step[open_ones] = -np.linalg.solve(curvature[np.ix_(open_ones, open_ones)], slope[open_ones])
-        step *= min(1.0, LARGEST_SCALE_STEP / max(float(np.abs(step).max()), np.finfo(float).tiny))
-        gain = -0.5 * float(slope @ step)
+        slope = evidence.slope
+        if curvature is not None:
+            step = search.step(logs, slope, curvature)
+            if -0.5 * float(slope @ step) > CONTRACTING * gain_before:
+                curvature = None
+        if curvature is None:
+            curvature = evidence.curvature()
+            step = search.step(logs, slope, curvature)
+        gain = gain_before = -0.5 * float(slope @ step)
         if gain < FLAT:
             logs = np.clip(logs + step, search.low, search.high)
             break
         for _ in range(MAX_HALVINGS):
             tried = np.clip(logs + step, search.low, search.high)
             new = search.evaluate(tried)
-            if new[0] <= value:
+            if new.value <= evidence.value:
                 break
             step /= 2
         else:
             break
-        logs = tried
-        value, slope, curvature = new
+        logs, evidence = tried, new
     scales = start.copy()
     scales[free] = np.exp(logs)
     return scales
@@ -721,57 +738,122 @@ class _ScaleSearch:
         """Largest logarithms."""
         return np.asarray(self._center + MAX_DEVIATION * self._spread)
 
-    def evaluate(self, logs: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        """Value, slope and expected curvature."""
+    def step(self, logs: FloatArray, slope: FloatArray, curvature: FloatArray) -> FloatArray:
+        """Newton's step of the scales that are not at an end of their range."""
+        held = ((logs <= self.low) & (slope > 0)) | ((logs >= self.high) & (slope < 0))
+        step = np.zeros(len(logs))
+        open_ones = np.flatnonzero(~held)
+        if len(open_ones):
+            step[open_ones] = -np.linalg.solve(curvature[np.ix_(open_ones, open_ones)], slope[open_ones])
+        return step * min(1.0, LARGEST_SCALE_STEP / max(float(np.abs(step).max()), np.finfo(float).tiny))
+
+    def evaluate(self, logs: FloatArray) -> _Evidence:
+        """Value there; slope and expected curvature on demand."""
         scales = self.start.copy()
         scales[self.free] = np.exp(logs)
-        linear, count = self.linear, len(self.linear.parts)
+        linear, count = self.linear, len(self.linear.bases)
         has_slack = len(self.terms) > count
         factor = float(scales[-1]) if has_slack else 0.0
         root, right = linear.information(scales[:count], factor)
         mean = cho_solve((root, False), right, check_finite=False)
-        covariance = _inverse(root)
         weights = 1 / (linear.level + factor**2)
         value = 0.5 * float(weights @ linear.data**2 - right @ mean) + float(np.log(np.diagonal(root)).sum())
-        value -= 0.5 * float(np.log(weights).sum())
-        ends = np.cumsum([linear.common.shape[1], *(part.shape[1] for part in linear.parts)])
-        places = [slice(first, end) for first, end in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)]
-        told = np.eye(len(mean)) - covariance
-        slope, curvature = np.zeros(len(self.terms)), np.zeros((len(self.terms),) * 2)
-        for number, place in enumerate(places):
-            slope[number] = np.trace(told[place, place]) - mean[place] @ mean[place]
-            for other, its_place in enumerate(places):
-                curvature[number, other] = 2 * float(np.sum(told[place, its_place] ** 2))
-        if has_slack and self.free[-1]:
-            slope[-1], curvature[-1] = self._by_slack(scales[:count], factor, mean, covariance, places)
-            curvature[:, -1] = curvature[-1]
         deviation = (logs - self._center) / self._spread
-        value += 0.5 * float(deviation @ deviation)
-        curvature = curvature[np.ix_(self.free, self.free)] + np.diag(1 / self._spread**2)
-        return value, slope[self.free] + deviation / self._spread, curvature
+        value += 0.5 * float(deviation @ deviation) - 0.5 * float(np.log(weights).sum())
+        return _Evidence(
+            value=value,
+            search=self,
+            scales=scales[:count],
+            factor=factor,
+            of_slack=has_slack and bool(self.free[-1]),
+            deviation=deviation,
+            root=root,
+            mean=mean,
+            weights=weights,
+        )
 
-    def _by_slack(
-        self, scales: FloatArray, factor: float, mean: FloatArray, covariance: FloatArray, places: list[slice]
-    ) -> tuple[float, FloatArray]:
-        """Slope by the logarithm of the slack, and its row of the expected curvature."""
-        linear, square = self.linear, factor**2
-        weights = 1 / (linear.level + square)
-        products = linear.products(square * weights**2, scales, beside=weights) / square
-        told = products[:-1, :-1]  # by how much the information falls
-        error = np.concatenate([-mean, np.ones(1)])
-        misfit = float(error @ products @ error)
-        fallen = covariance @ told
-        share = float(np.trace(fallen)) / float(weights.sum())
-        slope = square * (float(weights.sum()) * (1 - share) - misfit)
-        row = np.zeros(len(places) + 1)
-        for number, place in enumerate(places):
-            row[number] = 2 * square * float(np.sum(fallen[place] * covariance[:, place].T))
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Evidence:
+    """Minus the logarithm of the evidence for some scales; each derivative costs the third power of the parameters."""
+
+    value: float
+    search: _ScaleSearch
+    scales: FloatArray
+    factor: float
+    of_slack: bool
+    deviation: FloatArray
+    root: FloatArray
+    mean: FloatArray
+    weights: FloatArray
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Of shared errors and parameters, (c + k, c + k)."""
+        return _inverse(self.root)
+
+    @cached_property
+    def _places(self) -> list[slice]:
+        return [slice(first, end) for first, end in pairwise(self.search.linear.ends)]
+
+    @cached_property
+    def _by_slack(self) -> FloatArray:
+        """Sums over the data by which the information falls as the slack grows, (c + k + 1, c + k + 1)."""
+        square = self.factor**2
+        products = self.search.linear.products(square * self.weights**2, self.scales, beside=self.weights)
+        products /= square
+        return products
+
+    @cached_property
+    def _share(self) -> float:
+        """Mean share of a datum that parameters explain."""
+        explained = np.einsum("ij,ij->", self.covariance.T, self._by_slack[:-1, :-1])
+        return float(explained) / float(self.weights.sum())
+
+    @cached_property
+    def slope(self) -> FloatArray:
+        """By the logarithms of the free scales."""
+        search, known = self.search, 1 - np.diagonal(self.covariance)
+        slope = np.zeros(len(search.terms))
+        for number, place in enumerate(self._places):
+            slope[number] = known[place].sum() - self.mean[place] @ self.mean[place]
+        if self.of_slack:
+            error = np.append(-self.mean, 1.0)
+            misfit = float(error @ self._by_slack @ error)
+            slope[-1] = self.factor**2 * (float(self.weights.sum()) * (1 - self._share) - misfit)
+        return np.asarray(slope[search.free] + self.deviation / search._spread)
+
+    def curvature(self) -> FloatArray:
+        """Give the expected curvature."""
+        search, covariance = self.search, self.covariance
+        curvature = np.zeros((len(search.terms),) * 2)
+        for number, place in enumerate(self._places):
+            for other, its_place in enumerate(self._places):
+                block = covariance[place, its_place]
+                curvature[number, other] = 2 * float(np.einsum("ij,ij->", block, block))
+            size = place.stop - place.start
+            curvature[number, number] += 2 * float(size - 2 * np.trace(covariance[place, place]))
+        if self.of_slack:
+            curvature[-1] = curvature[:, -1] = self._row_of_slack()
+        return np.asarray(curvature[np.ix_(search.free, search.free)] + np.diag(1 / search._spread**2))
+
+    def _row_of_slack(self) -> FloatArray:
+        square, told = self.factor**2, self._by_slack[:-1, :-1]
+        row = np.zeros(len(self._places) + 1)
+        for number, place in enumerate(self._places):
+            columns = self.covariance[:, place]
+            row[number] = 2 * square * float(np.einsum("ij,ij->", told, columns @ columns.T))
         # the trace of the square of R^-1 without what parameters explain, as if they explained the same of every datum
-        row[-1] = 2 * (square * (1 - share)) ** 2 * float(np.sum(weights**2))
-        return slope, row
+        row[-1] = 2 * (square * (1 - self._share)) ** 2 * float(np.sum(self.weights**2))
+        return row
 
 
 def _inverse(root: FloatArray) -> FloatArray:
-    """Inverse of a matrix from its upper Cholesky factor."""
-    upper = np.triu(lapack.dpotri(root)[0])
-    return np.asarray(upper + np.triu(upper, 1).T)
+    """Inverse of a matrix from its upper Cholesky factor, with zeros below."""
+    inverse = np.asarray(lapack.dpotri(root)[0])
+    for first in range(0, len(inverse), ROWS_OF_A_TILE):
+        end = first + ROWS_OF_A_TILE
+        corner = inverse[first:end, first:end]
+        corner += np.triu(corner, 1).T
+        inverse[end:, first:end] = inverse[first:end, end:].T
+    return inverse

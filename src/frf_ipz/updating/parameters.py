@@ -82,7 +82,10 @@ class PriorTerm(Concise):
         is_used = self.root != 0.0
         if np.all(np.count_nonzero(is_used, axis=0) == 1):
             rows = np.argmax(is_used, axis=0)
-            return np.asarray(np.take(slopes, rows, axis=1) * self.root[rows, np.arange(len(rows))])
+            first = int(rows[0]) if len(rows) else 0
+            is_run = np.array_equal(rows, np.arange(first, first + len(rows)))
+            chosen = slopes[:, first : first + len(rows)] if is_run else np.take(slopes, rows, axis=1)
+            return np.asarray(chosen * self.root[rows, np.arange(len(rows))])
         used = np.flatnonzero(is_used.any(axis=1))
         return np.asarray(slopes[:, used] @ self.root[used])
 

@@ -13,8 +13,8 @@ from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NumericalError
-from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros, undamped_poles, undamped_zeros
-from frf_ipz.numerics.pole_forms import PoleForm, damped_form, every_damped_zero, undamped_form
+from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros, undamped_poles
+from frf_ipz.numerics.pole_forms import PoleForm, damped_form, every_damped_zero, every_undamped_zero, undamped_form
 
 SAME_ROOT = 0.5  # overlap of its vectors with those before, above which no other root can be more alike
 APART = 1e-9  # relative distance below which two zeros of an FRF are one
@@ -209,11 +209,12 @@ def nominal_roots(
         roots = undamped_poles(mass, stiffness)
         groups.append((poles, roots.take(_assign(distance(poles, roots)))))
     if len(zeros):
-        roots, found = targets.near(undamped_form(mass, stiffness), -(computed[zeros] ** 2), zeros)
+        form = undamped_form(mass, stiffness)
+        roots, found = targets.near(form, -(computed[zeros] ** 2), zeros)
         logs = np.log(np.abs(computed[zeros]))
         found &= np.abs(logs - 0.5 * np.log(np.abs(roots.values) + np.finfo(float).tiny)) < NEAR
         for number, members in _lost(targets, zeros, found).items():
-            every = undamped_zeros(mass, stiffness, *targets.rows[number])
+            every = every_undamped_zero(form, *targets.rows[number])
             _put(roots, members, every.take(_assign(distance(zeros[members], every))))
         groups.append((zeros, roots))
     return TrackedRoots(groups=tuple(groups))
@@ -244,10 +245,11 @@ def track(targets: TargetRoots, before: TrackedRoots, mass: FloatArray, stiffnes
             continue
         force = stiffness @ old.right_vectors - (mass @ old.right_vectors) * old.values
         start = old.values + np.sum(old.left_vectors * force, axis=0) / old.slope
-        new, found = targets.near(undamped_form(mass, stiffness), start, indices)
+        form = undamped_form(mass, stiffness)
+        new, found = targets.near(form, start, indices)
         found &= _own_overlap(old, new, mass, new.slope) > SAME_ROOT
         for number, members in _lost(targets, indices, found).items():
-            every = undamped_zeros(mass, stiffness, *targets.rows[number])
+            every = every_undamped_zero(form, *targets.rows[number])
             _put(new, members, every.take(_assign(-_overlap(old.take(members), every, mass, every.slope))))
         groups.append((indices, new))
     return TrackedRoots(groups=tuple(groups))

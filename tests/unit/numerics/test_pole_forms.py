@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from frf_ipz.numerics.pencils import damped_zeros, undamped_zeros
-from frf_ipz.numerics.pole_forms import damped_form, every_damped_zero, undamped_form
+from frf_ipz.numerics.pole_forms import damped_form, every_damped_zero, every_undamped_zero, undamped_form
 
 ORDER = 12
 FROM = 1e-4  # relative distance of the start from a zero
@@ -90,6 +90,28 @@ def test_every_zero_is_found(rows, rigid, dashpot):
         (found,) = every_damped_zero(*model, output[None], force[None])
         expected = upper_of(damped_zeros(*model, output, force).values)
         assert_allclose(upper_of(found.values), expected, rtol=1e-7)
+
+
+@pytest.mark.parametrize("rigid", [False, True])
+def test_every_zero_without_damping_is_found_with_its_vectors(rows, rigid):
+    """Some are complex, the others are computed in real numbers."""
+    mass, _, stiffness = matrices(3, rigid=rigid)
+    form = undamped_form(mass, stiffness)
+    for output, force in (rows, (rows[0], rows[0]), np.eye(ORDER)[[0, 5]]):
+        found, pencil = every_undamped_zero(form, output, force), undamped_zeros(mass, stiffness, output, force)
+        found = found.take(np.abs(found.values - pencil.values[:, None]).argmin(axis=1))
+        assert_allclose(found.values, pencil.values, rtol=1e-7)
+        moved = found.left_vectors * found.right_vectors / found.slope
+        expected = pencil.left_vectors * pencil.right_vectors / pencil.slope
+        assert np.abs(moved - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+def test_zeros_of_two_modes_that_are_one_are_left_to_the_pencil(rows):
+    mass, stiffness = np.eye(3), np.diag([1.0, 1.0, 4.0])
+    found = every_undamped_zero(undamped_form(mass, stiffness), rows[0, :3], rows[1, :3])
+    assert_allclose(
+        np.sort_complex(found.values), np.sort_complex(undamped_zeros(mass, stiffness, *rows[:, :3]).values), rtol=1e-9
+    )
 
 
 def test_matrices_that_are_not_symmetric_are_taken_too(rows):

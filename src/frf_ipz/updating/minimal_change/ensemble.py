@@ -84,7 +84,7 @@ def _draw_stiffness(
     mass, stiffness = phase.matrices(theta)
     # the poles predicted by the linear step are imposed: far from the mean, second-order terms would blur them
     poles = np.flatnonzero(phase.target_roots.frf < 0)
-    sensitivity = np.empty((len(poles), sum(part.shape[1] for part in result.linear.parts)))
+    sensitivity = np.empty((len(poles), result.linear.ends[-1] - result.linear.ends[0]))
     for place, rows in result.linear.sensitivity(result.scales[:-1]):
         is_pole = phase.target_roots.frf[place] < 0
         sensitivity[np.searchsorted(poles, place[is_pole])] = rows[is_pole]
