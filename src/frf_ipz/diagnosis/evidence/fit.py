@@ -129,6 +129,18 @@ class Data:
             squares = np.broadcast_to(squares.sum(0), squares.shape)
         return np.asarray(products / squares)
 
+    def gain_directions(self, response: Response) -> FloatArray:
+        """Orthonormal directions along which unknown gains move the whitened FRFs, (n_data, n_gains) array."""
+        if self.free_gains == "none":
+            return np.zeros((2 * self.measured.values.size, 0))
+        model = self._weigh(response.values[:, :, None])[:, :, 0]
+        if self.free_gains == "common":
+            return np.asarray(model.reshape(-1, 1) / np.linalg.norm(model))
+        directions = np.zeros((*model.shape, len(model)))
+        own = np.arange(len(model))
+        directions[own, :, own] = model / np.linalg.norm(model, axis=1)[:, None]
+        return directions.reshape(-1, len(model))
+
     def slopes(self, response: Response, changes: ComplexArray) -> FloatArray:
         """Whitened changes of the model's FRFs, (n_data, n) array, projected on what unknown gains cannot change.
 

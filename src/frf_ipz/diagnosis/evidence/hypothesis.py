@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -195,7 +195,7 @@ def make_hypothesis(
     """
     parameters = tuple(component.effect.parameters(context, component.location) for component in components)
     builders = build_together(context, [(component.effect, component.location) for component in components])
-    basis, moved = context.basis, NO_CHANGE
+    basis, moved = replace(context.basis), NO_CHANGE  # a copy remembers what this hypothesis needs, and no other
     typicals = [
         (component is not components[-1], typical_change(context, component.effect, component.location, build))
         for component, build in zip(components, builders, strict=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 LAST_STEPS = 90  # along a curved valley many are small
 MANY_POINTS = 120  # of a contour: every other one is enough for first steps
 FEW_POINTS = 110  # of a contour: what a score test of small effects needs
+REMEMBERED_BYTES = 2**26  # of the shapes of hypotheses: a small part of what a computer has
 ROUGH_FLOOR = 8.0  # times the model's errors: first steps overlook narrow peaks
 
 
@@ -74,11 +75,20 @@ class InferenceProblem:
     sparse_data: Data
     kind: str
     deadline: Deadline = NO_LIMIT
+    _known: dict[tuple[object, ...], Hypothesis] = field(init=False, default_factory=dict, repr=False)
 
     def make_hypothesis(self, components: tuple[Component, ...], *, exact: bool = True) -> Hypothesis:
-        """Make a hypothesis; raises DeadlineError where there is no time for it."""
+        """Make a hypothesis, or give the known one; raises DeadlineError where there is no time for it."""
         self.deadline.check()
-        return make_hypothesis(self.context, self.nuisance_prior, components, exact=exact)
+        key = (exact, *((component.key, component.n_locations) for component in components))
+        if key in self._known:
+            hypothesis = self._known.pop(key)
+        else:
+            hypothesis = make_hypothesis(self.context, self.nuisance_prior, components, exact=exact)
+        self._known[key] = hypothesis  # the latest is last
+        if len(self._known) > 1 and len(self._known) * hypothesis.basis.vectors.nbytes > REMEMBERED_BYTES:
+            self._known.pop(next(iter(self._known)))
+        return hypothesis
 
     def fit(self, components: tuple[Component, ...], values: FloatArray, *, cost_limit: float = np.inf) -> Fit:
         """Fit components, from values of their parameters; stopped early if the cost cannot come below a limit."""

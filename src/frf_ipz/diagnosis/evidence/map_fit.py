@@ -17,7 +17,7 @@ from scipy import linalg
 
 from frf_ipz.arrays import BoolArray, FloatArray
 from frf_ipz.diagnosis.evidence.fit import Data, Fit
-from frf_ipz.diagnosis.model.response import nuisance_jacobian
+from frf_ipz.diagnosis.evidence.interpolated_slopes import differentiate_by_nuisance
 from frf_ipz.numerics.levenberg_marquardt import (
     AcceptedStep,
     LeastSquaresStatus,
@@ -168,15 +168,19 @@ class _MapProblem:
             changes.append((after.values - before.values) / step)
             squares.append((after.modes.squares[:m] - before.modes.squares[:m]) / step)
             ratios.append((after.modes.stated_ratio[:m] - before.modes.stated_ratio[:m]) / step)
-        by_nuisance = nuisance_jacobian(point.response, hypothesis.nuisance_prior, hypothesis.context.layout)
-        white = data.slopes(point.response, np.dstack([*changes, by_nuisance]))
-        used = np.sum(white[:, n_parameters:] ** 2, 0) > MIN_INFLUENCE
-        jacobian = white[:, np.concatenate([np.ones(n_parameters, bool), used])]
+        slopes = differentiate_by_nuisance(data, point.response, hypothesis.nuisance_prior, hypothesis.context.layout)
+        used = slopes.squares() > MIN_INFLUENCE
+        slopes = slopes.select(used)
+        n_data = len(point.misfit)
+        by_parameters = data.slopes(point.response, np.dstack(changes)) if changes else np.zeros((n_data, 0))
+        across = slopes.products_with(np.column_stack([by_parameters, point.misfit]))
         prior = np.concatenate([PRIOR_CURVATURE / (hypothesis.high - hypothesis.low) ** 2, point.slopes[used] ** 2])
-        right = jacobian.T @ point.misfit
+        right = np.concatenate([by_parameters.T @ point.misfit, across[:, -1]])
         right[n_parameters:] -= (point.whitened_nuisance * point.slopes)[used]
+        between = across[:, :-1]
+        matrix = np.block([[by_parameters.T @ by_parameters, between.T], [between, slopes.products()]])
         return _Linearisation(
-            matrix=jacobian.T @ jacobian + np.diag(prior),
+            matrix=matrix + np.diag(prior),
             right=right,
             used=used,
             squares=np.reshape(squares, (n_parameters, m)).T,

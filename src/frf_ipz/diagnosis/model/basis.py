@@ -8,7 +8,7 @@ parameters at a location.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ import numpy as np
 from scipy import linalg, sparse
 
 from frf_ipz.arrays import FloatArray
+from frf_ipz.diagnosis.model.matrix_sum import MatrixSum
 from frf_ipz.diagnosis.model.motion import stack_motions
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.assembly import multiply
@@ -66,6 +67,7 @@ class Basis:
     damping: FloatArray
     highest_rad_s: float
     measured: tuple[AnyDof, ...]
+    _projected: dict[int, tuple[Matrix, FloatArray]] = field(init=False, default_factory=dict, repr=False)
 
     @property
     def loaded_shapes(self) -> FloatArray:
@@ -73,19 +75,29 @@ class Basis:
         count = max(int(np.count_nonzero(self.modes.omega_rad_s <= LOADED_MODES * self.highest_rad_s)), 1)
         return _to_all_dofs(self.model, self.modes.shapes[:, :count])
 
-    def project(self, matrix: Matrix) -> FloatArray:
+    def project(self, matrix: MatrixSum | Matrix) -> FloatArray:
         """Bring a matrix of all DOFs into these coordinates.
 
         Parameters
         ----------
-        matrix : (n_all, n_all) sparse array
-            Symmetric.
+        matrix : (n_all, n_all) sparse array or MatrixSum
+            Symmetric; the matrices of a sum are remembered.
 
         Returns
         -------
         (q, q) array
             The same in the basis.
         """
+        if not isinstance(matrix, MatrixSum):
+            return self._project(matrix)
+        total = np.zeros_like(self.stiffness)
+        for factor, term in matrix.terms:
+            if id(term) not in self._projected:
+                self._projected[id(term)] = term, self._project(term)  # with the term, whose id stays its own
+            total += factor * self._projected[id(term)][1]
+        return total
+
+    def _project(self, matrix: Matrix) -> FloatArray:
         rows = _nonzero_rows(matrix)
         return np.asarray(self.vectors[rows].T @ multiply(matrix[rows], self.vectors))
 
@@ -170,13 +182,12 @@ def enrich_basis(basis: Basis, change: Change) -> Basis:
         shapes.append(constraint)
         loads.append(_inertia(model, constraint))
     around = np.hstack([basis.loaded_shapes, *shapes])
-    for matrix in (change.stiffness, change.mass):
-        if matrix is not None:
-            first = multiply(matrix, around)
-            loads.append(first)
-            loaded = first[_nonzero_rows(matrix)]
-            if np.linalg.matrix_rank(loaded, tol=1e-9 * np.linalg.norm(loaded)) > 2:
-                loads.append(multiply(matrix, _deflections(basis, first)))
+    for matrix in (added.tocsr() for added in (change.stiffness, change.mass) if added is not None):
+        first = multiply(matrix, around)
+        loads.append(first)
+        loaded = first[_nonzero_rows(matrix)]
+        if np.linalg.matrix_rank(loaded, tol=1e-9 * np.linalg.norm(loaded)) > 2:
+            loads.append(multiply(matrix, _deflections(basis, first)))
     loads += [attachment.motions for attachment in change.attachments]
     if change.moved:
         places = change.moved.values()

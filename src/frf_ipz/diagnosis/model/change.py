@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.diagnosis.model.matrix_sum import MatrixSum
 from frf_ipz.dofs import AnyDof, Dof
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ class Change:
     ----------
     model : StructuralModel, optional
         A model that replaces the nominal one, with the same DOFs.
-    mass, stiffness : (n_all, n_all) sparse array, optional
+    mass, stiffness : (n_all, n_all) sparse array or MatrixSum, optional
         What is added to the matrices of all DOFs.
     released : tuple of int
         Fixed DOFs (rows of all) that may move; `stiffness` says what supports them.
@@ -89,8 +90,8 @@ class Change:
     """
 
     model: StructuralModel | None = None
-    mass: Matrix | None = None
-    stiffness: Matrix | None = None
+    mass: MatrixSum | Matrix | None = None
+    stiffness: MatrixSum | Matrix | None = None
     released: tuple[int, ...] = ()
     floating: bool = False
     attachments: tuple[Attachment, ...] = ()
@@ -143,9 +144,11 @@ def place_sensor(dof: AnyDof, where: int | Dof | None) -> AnyDof:
     return replace(dof, node=where)
 
 
-def _sum(first: Matrix | None, second: Matrix | None) -> Matrix | None:
+def _sum(first: MatrixSum | Matrix | None, second: MatrixSum | Matrix | None) -> MatrixSum | Matrix | None:
     if first is None or second is None:
         return first if second is None else second
+    if isinstance(second, MatrixSum):
+        return second + first
     return first + second
 
 
@@ -191,10 +194,10 @@ def with_change(model: StructuralModel, change: Change) -> StructuralModel:
     changed = replace(
         changed,
         fixed=fixed,
-        mass_all=changed.mass_all if change.mass is None else sparse.csr_array(changed.mass_all + change.mass),
+        mass_all=changed.mass_all if change.mass is None else sparse.csr_array(changed.mass_all + change.mass.tocsr()),
         stiffness_all=changed.stiffness_all
         if change.stiffness is None
-        else sparse.csr_array(changed.stiffness_all + change.stiffness),
+        else sparse.csr_array(changed.stiffness_all + change.stiffness.tocsr()),
         damping_all=changed.damping_all if change.modal_ratio is None else 0 * changed.damping_all,
         structural_damping_all=changed.structural_damping_all if change.modal_ratio is None else None,
         modal_damping=stated,

@@ -186,17 +186,9 @@ class NuisancePrior:
     @property
     def blocks(self) -> NuisanceBlocks:
         """Where each kind of parameter stands."""
-        n_pairs, n_axes = self.n_modes * (self.n_modes + 1) // 2, len(self.axes)
-        return NuisanceBlocks.in_order(
-            stiffness=n_pairs,
-            mass=n_pairs,
-            damping=self.n_modes,
-            suspension=self.n_rigid,
-            output_shifts=n_axes * self.n_outputs,
-            input_shifts=n_axes * self.n_inputs,
-            local=len(self.local_std),
-            gains=self.n_channels,
-        )
+        n_axes = len(self.axes)
+        shifts = n_axes * self.n_outputs, n_axes * self.n_inputs
+        return _place_blocks(self.n_modes, self.n_rigid, *shifts, len(self.local_std), self.n_channels)
 
     @property
     def size(self) -> int:
@@ -321,6 +313,23 @@ class NuisancePrior:
 
 def _indices(block: slice) -> IntArray:
     return np.arange(block.start, block.stop, dtype=np.int64)
+
+
+@cache
+def _place_blocks(
+    n_modes: int, n_rigid: int, n_output_shifts: int, n_input_shifts: int, n_frfs: int, n_channels: int
+) -> NuisanceBlocks:
+    n_pairs = n_modes * (n_modes + 1) // 2
+    return NuisanceBlocks.in_order(
+        stiffness=n_pairs,
+        mass=n_pairs,
+        damping=n_modes,
+        suspension=n_rigid,
+        output_shifts=n_output_shifts,
+        input_shifts=n_input_shifts,
+        local=n_frfs,
+        gains=n_channels,
+    )
 
 
 @cache

@@ -79,8 +79,8 @@ def respond(
     Response
         What would be measured without noise.
     """
-    outputs = modes.outputs + np.einsum("na,naq->nq", nuisance_values.output_shift, modes.output_shifts)
-    inputs = modes.inputs + np.einsum("na,naq->nq", nuisance_values.input_shift, modes.input_shifts)
+    outputs = modes.outputs + _shift(nuisance_values.output_shift, modes.output_shifts)
+    inputs = modes.inputs + _shift(nuisance_values.input_shift, modes.input_shifts)
     n_outputs = len(outputs)
     motions = [attachment.motions for attachment in change.attachments]
     attached = np.hstack(motions).T @ basis.vectors @ modes.vectors if motions else np.zeros((0, len(modes.omega)))
@@ -88,7 +88,8 @@ def respond(
     motion = _solve(modes, _modulus(change, modes, s), loads, s)
     attached_motion = motion[:, :, n_outputs + len(inputs) :]
     stiffness = _coupled_stiffness(attached_motion, attached, change, s)
-    motion = motion - np.matmul(attached_motion, np.matmul(stiffness, np.matmul(attached, motion)))
+    if motions:
+        motion = motion - np.matmul(attached_motion, np.matmul(stiffness, np.matmul(attached, motion)))
     output_motion, input_motion = motion[:, :, :n_outputs], motion[:, :, n_outputs : n_outputs + len(inputs)]
     receptance = np.matmul(outputs, input_motion)[:, layout.output_index, layout.input_index] + nuisance_values.local
     chain = (
@@ -104,6 +105,11 @@ def respond(
         attached_motion=attached_motion,
         attached_stiffness=stiffness,
     )
+
+
+def _shift(distances: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Change of shapes, (n, q), by distances, (n, n_axes), with slopes, (n, n_axes, q)."""
+    return np.asarray(np.matmul(distances[:, None], slopes)[:, 0])
 
 
 def _modulus(change: Change, modes: Modes, s: ComplexArray) -> ComplexArray:

@@ -265,10 +265,12 @@ def _step(problem: InferenceProblem, known: tuple[Component, ...], start: Start,
             component = Component(
                 effect=start.component.effect, location=location, n_locations=start.component.n_locations
             )
-            hypothesis = problem.make_hypothesis((*known, component))
-            if component.key in tried or len(hypothesis.parameters) != len(start.values):
+            if component.key in tried:
                 continue
             tried.add(component.key)
+            hypothesis = problem.make_hypothesis((*known, component))
+            if len(hypothesis.parameters) != len(start.values):
+                continue
             values, cost = refine(hypothesis, measured, weights, start.values, iterations=3)
             if cost < best.cost - GAIN:
                 best = Start(component=component, values=values, cost=cost)

@@ -17,6 +17,7 @@ from frf_ipz.diagnosis.catalogue.effect import (
 )
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.diagnosis.model.matrix_sum import MatrixSum
 from frf_ipz.fe.changes import with_point_masses
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ class AddedMass(Effect):
         """Mass in all translational directions of the node."""
         model = context.model
         unit = with_point_masses(model, {location.node: 1.0}).mass_all - model.mass_all
-        return lambda values: Change(mass=values[0] * unit)
+        return lambda values: Change(mass=MatrixSum(((values[0], unit),)))
 
     def signature(self, context: ModelContext, location: Location) -> Signature:
         """s^2 m against the direction of the test."""

@@ -13,6 +13,7 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.diagnosis.model.matrix_sum import MatrixSum
 from frf_ipz.fe.beam_models import geometric_stiffness
 from frf_ipz.fe.kinds.beam import BeamFile
 
@@ -45,7 +46,7 @@ class AxialLoad(Effect):
         """Add geometric stiffness."""
         del location
         unit = geometric_stiffness(context.model)
-        return lambda values: Change(stiffness=values[0] * unit)
+        return lambda values: Change(stiffness=MatrixSum(((values[0], unit),)))
 
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Both signs, from weak to strong."""

@@ -12,6 +12,7 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, grid
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.diagnosis.model.matrix_sum import MatrixSum
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.kinds.beam import BeamFile
 
@@ -59,12 +60,10 @@ class BoundaryCompliance(Effect):
         model = context.model
         released = tuple(model.full_index(Dof(location.node, way)) for way in location.directions)
         size = len(model.all_dofs)
-
-        def change(values: FloatArray) -> Change:
-            springs = sparse.csr_array((values, (released, released)), shape=(size, size))
-            return Change(released=released, stiffness=springs)
-
-        return change
+        units = [sparse.csr_array(([1.0], ([row], [row])), shape=(size, size)) for row in released]
+        return lambda values: Change(
+            released=released, stiffness=MatrixSum(tuple(zip(values.tolist(), units, strict=True)))
+        )
 
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Spread a grid, finer where there is one spring."""

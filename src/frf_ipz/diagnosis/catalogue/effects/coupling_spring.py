@@ -13,6 +13,7 @@ from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Signa
 from frf_ipz.diagnosis.catalogue.effects.grounded_spring import SOFTEST, STIFFEST, floating, is_floating
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.diagnosis.model.matrix_sum import MatrixSum
 from frf_ipz.diagnosis.model.motion import Motion, make_unit_stiffness
 from frf_ipz.dofs import Dof
 
@@ -48,7 +49,7 @@ class CouplingSpring(Effect):
         """Add it to the matrix."""
         unit = make_unit_stiffness(_motion(context, location), len(context.model.all_dofs))
         floats = is_floating(location)
-        return lambda values: Change(stiffness=values[0] * unit, floating=floats)
+        return lambda values: Change(stiffness=MatrixSum(((values[0], unit),)), floating=floats)
 
     def log_prior(self, context: ModelContext, location: Location, values: FloatArray) -> float:
         """Share the prior of a listed pair among the pairs that it stands for where not all are listed."""

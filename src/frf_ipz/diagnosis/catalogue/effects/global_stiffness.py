@@ -11,6 +11,7 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.diagnosis.model.matrix_sum import MatrixSum
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
@@ -40,7 +41,7 @@ class GlobalStiffness(Effect):
         """Scale the matrix."""
         del location
         whole = context.model.stiffness_all
-        return lambda values: Change(stiffness=(values[0] - 1) * whole)
+        return lambda values: Change(stiffness=MatrixSum(((values[0] - 1, whole),)))
 
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Softer and stiffer, by little and by much."""

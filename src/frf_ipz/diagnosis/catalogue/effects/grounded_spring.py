@@ -18,6 +18,7 @@ from frf_ipz.diagnosis.catalogue.effect import (
 )
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.diagnosis.model.matrix_sum import MatrixSum
 from frf_ipz.diagnosis.model.motion import make_unit_stiffness
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ class GroundedSpring(Effect):
         """Add it to the diagonal."""
         unit = make_unit_stiffness(context.motion(location.dof), len(context.model.all_dofs))
         floats = is_floating(location)
-        return lambda values: Change(stiffness=values[0] * unit, floating=floats)
+        return lambda values: Change(stiffness=MatrixSum(((values[0], unit),)), floating=floats)
 
     def signature(self, context: ModelContext, location: Location) -> Signature | None:
         """Give a constant stiffness."""

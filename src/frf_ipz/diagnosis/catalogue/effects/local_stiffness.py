@@ -11,6 +11,7 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter, Signature
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Change
+from frf_ipz.diagnosis.model.matrix_sum import MatrixSum
 from frf_ipz.diagnosis.model.motion import Motion
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.changes import part_matrices
@@ -57,7 +58,7 @@ class LocalStiffness(Effect):
     def build(self, context: ModelContext, location: Location) -> Builder:
         """Scale the parts' share of the matrix."""
         _, stiffness = part_matrices(context.model, _kind(location), _names(location))
-        return lambda values: Change(stiffness=(values[0] - 1) * stiffness)
+        return lambda values: Change(stiffness=MatrixSum(((values[0] - 1, stiffness),)))
 
     def start_values(self, context: ModelContext, location: Location) -> FloatArray:
         """Softer and stiffer, by little and by much."""
