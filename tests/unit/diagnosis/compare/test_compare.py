@@ -134,7 +134,7 @@ def test_a_node_cannot_lose_more_than_it_has(nominal):
     (mass,) = effect.parameters(context, location)
     assert HUNG_KG < mass.high < HUNG_KG + context.mass_kg / 16  # and what an element has
     change = effect.build(context, location)(np.array([mass.high]))
-    remaining = (context.model.mass_all + change.mass).toarray()[~nominal.fixed][:, ~nominal.fixed]
+    remaining = (context.model.mass_all + change.mass.tocsr()).toarray()[~nominal.fixed][:, ~nominal.fixed]
     assert np.linalg.eigvalsh(remaining).min() > 0
 
 
