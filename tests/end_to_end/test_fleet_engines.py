@@ -1,4 +1,7 @@
-"""Forty machines on this machine and on a real Dask cluster whose workers are killed: nothing lost, nothing twice."""
+"""Machines on this machine and on a real Dask cluster whose workers are killed: nothing lost, nothing twice.
+
+MACHINES=40 is the long proof.
+"""
 
 import json
 import os
@@ -20,10 +23,9 @@ from frf_ipz.runs.generations import stamp
 
 pytestmark = pytest.mark.slow
 
-COUNT = 40
+COUNT = int(os.environ.get("MACHINES", "16"))
 TABLES = ("fleet", "fleet_poles", "fleet_zeros", "fleet_parameters", "fleet_findings")
 PATIENCE_S = 300.0
-MOST_CPU = 1.1  # of a run in a process that has run before
 DASK = (sys.executable, "-m", "distributed.cli")
 
 
@@ -67,14 +69,14 @@ class Killer:
 
     def __call__(self, _fraction, text):
         done = text.partition(" of ")[0]
-        if self.kills < 2 and done.isdigit() and int(done) >= 8 * (1 + self.kills):
+        if self.kills < 2 and done.isdigit() and int(done) >= COUNT // 5 * (1 + self.kills):
             self.whole = whole_results(self.out) | self.whole
             os.kill(self.workers()[0], signal.SIGKILL)
             self.kills += 1
 
     def assert_nothing_twice(self):
         assert self.kills == 2
-        assert len(self.whole) >= 8
+        assert len(self.whole) >= COUNT // 5
         assert {name: stamp(self.out / "machines" / name) for name in self.whole} == self.whole
 
 
@@ -91,19 +93,6 @@ def test_killed_processes_lose_nothing_and_repeat_nothing(fleet, alone, tmp_path
     results = frf_ipz.run_fleet(fleet, tmp_path / "out", jobs=2, progress=killer)
     assert (results.to_frame()["status"] == "done").sum() == COUNT
     killer.assert_nothing_twice()
-    assert_same_tables(alone, results)
-
-
-def test_a_machine_takes_no_more_than_a_run_in_a_process_that_has_run_before(fleet, alone, tmp_path):
-    results = frf_ipz.run_fleet(fleet, tmp_path / "out", jobs=2)
-    of_machines = results.to_frame()["cpu_s"].median()
-    pipelines = sorted((results.path / "pipelines").glob("*.toml"))[:10]
-    spent = []
-    for number, pipeline in enumerate(pipelines):
-        started = time.thread_time()
-        frf_ipz.run_pipeline(pipeline, tmp_path / f"run{number}", until="export")
-        spent.append(time.thread_time() - started)
-    assert of_machines <= MOST_CPU * sorted(spent)[len(spent) // 2]
     assert len(list((results.path / "reduced").glob("*.result"))) == 1
     assert_same_tables(alone, results)
 

@@ -126,7 +126,7 @@ def test_killed_before_some_changes_it_is_the_old_or_the_new_whole(cases, verb):
 @pytest.mark.parametrize("verb", VERBS)
 def test_killed_before_any_change_it_is_the_old_or_the_new_whole(cases, verb):
     case = cases(verb)
-    moments = sorted({*range(0, case.n_changes, 1 if N_TRIALS > 1 else 30), case.n_changes - 1})
+    moments = sorted({*range(0, case.n_changes, 1 if N_TRIALS > 1 else 60), case.n_changes - 1})
     found = [kill_before(case, number) for number in moments]
     first = found.index(case.new)
     assert first > 0
@@ -137,7 +137,7 @@ def test_killed_before_any_change_it_is_the_old_or_the_new_whole(cases, verb):
 @pytest.mark.parametrize("verb", VERBS)
 def test_stopped_before_any_change_nothing_is_left_lying_about(cases, verb):
     case = cases(verb)
-    for number in range(0, case.n_changes, 1 if N_TRIALS > 1 else 7):
+    for number in range(0, case.n_changes, 1 if N_TRIALS > 1 else 25):
         out = case.copy(case.folder / "stopped")
         command = case.start(out, stopped_before=number)
         status = command.wait()
