@@ -102,6 +102,8 @@ def test_a_few_mutations(undiagnosed, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [11, 12, 13, 14])
-def test_many_mutations(originals, tmp_path, seed):
-    assert not list(faults(originals, tmp_path, seed, MANY // 4))
+@pytest.mark.parametrize(
+    ("inputs", "seed"), [("originals", 11), ("undiagnosed", 12), ("undiagnosed", 13), ("undiagnosed", 14)]
+)
+def test_many_mutations(request, tmp_path, inputs, seed):
+    assert not list(faults(request.getfixturevalue(inputs), tmp_path, seed, MANY // 4))
