@@ -37,8 +37,9 @@ H = H + 1e-3 * np.random.default_rng(0).normal(size=(*H.shape, 2)).view(complex)
 frfs = frf_ipz.FrfSet.from_arrays(lines_hz, H, outputs=outputs, inputs=inputs, variance=np.full(H.shape, 2e-6))
 
 # %%
-# Mass 2 carries the tool, and no sensor.
-results = frf_ipz.Campaign(frfs, model, points=["2:+x"]).run(until="export")
+# Mass 2 carries the tool, and no sensor. The springs are known to a tenth: such a difference is nothing missing.
+tolerances = frf_ipz.DiagnoseOptions(stiffness_tolerance=0.1, frequency_tolerance=0.05)
+results = frf_ipz.Campaign(frfs, model, points=["2:+x"], diagnose=tolerances).run(until="export")
 print(results.summary())
 
 # %%
