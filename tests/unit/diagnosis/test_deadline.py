@@ -8,7 +8,7 @@ from frf_ipz.diagnosis.diagnose import find_causes
 from frf_ipz.diagnosis.effect_selection import EffectCatalogue
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
-EFFECTS = ("added_mass", "grounded_spring")
+EFFECTS = ("added_mass",)
 
 
 class Clock:
