@@ -45,6 +45,8 @@ GAP = 0.06  # of the height, between panels
 GAP_BESIDE = 0.08  # of the width
 POINTS = 44_000  # of one kind of curve on the whole page: keeps a page of 900 FRFs below 10 MB
 BINS = (40, 1200)  # of one curve: the fewest that still have its peaks and notches, and as many as a screen has columns
+ROWS = 1200  # of a screen: a curve that stays within half a row of the line drawn instead looks the same
+LONGEST = {False: 32, True: 8}  # points that one line stands for, of curves and of dots: a pointer finds one near it
 LOGARITHMIC = 0.35  # of the bins are spread evenly over the logarithm of the frequency, the others over the frequency
 MOST_CELLS = 240  # of a map in which the numbers are written
 BESIDE_NAMES_PX = {"x": 30, "y": 10}  # from names of categories to the title of their axis
@@ -74,12 +76,15 @@ def draw_picture(picture: Picture, *, n_alike: int = 1) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``data``, the traces, with NumPy arrays; and ``layout``, without what the theme of the page adds.
+        ``data``, the traces, with NumPy arrays; ``layout``, without what the theme of the page adds; and ``drawn``, how
+        many points of the curves there are, where some are left out.
     """
     named = {id(layer) for layer in legend_layers(picture)} if picture.has_legend else set()
     traces: list[Trace] = []
+    counts: list[tuple[int, int]] = []
     for index, panel in enumerate(picture.panels):
         chosen = _thinned_points(panel, POINTS // n_alike)
+        counts += [(len(chosen[id(layer)]), len(layer.x)) for layer in panel.layers if id(layer) in chosen]
         is_beside = panel.x is not None
         drawn = [(layer, _number("y", 0 if is_beside else index)) for layer in panel.layers]
         if panel.backdrop is not None:
@@ -88,7 +93,19 @@ def draw_picture(picture: Picture, *, n_alike: int = 1) -> dict[str, Any]:
             for trace in _draw(_thinned(layer, chosen.get(id(layer))), panel):
                 axes = {"xaxis": _number("x", index if is_beside else 0), "yaxis": y}
                 traces.append(_with_common(trace, layer, named, axes))
-    return {"data": traces, "layout": _layout(picture, has_legend=bool(named))}
+    drawn = _count_of_points(counts, "lines" if picture.is_over_frequency else "points")
+    return {"data": traces, "layout": _layout(picture, has_legend=bool(named)), **drawn}
+
+
+def _count_of_points(counts: Sequence[tuple[int, int]], noun: str) -> dict[str, str]:
+    """Say how many points are drawn of how many: what lies between them shows no more by zooming in."""
+    left_out = [(drawn, there) for drawn, there in counts if drawn < there]
+    if not left_out:
+        return {}
+    low, high = (end(drawn for drawn, _ in left_out) for end in (min, max))
+    drawn = f"{low}" if low == high else f"{low} to {high}"
+    text = f"A curve is drawn through {drawn} of {max(there for _, there in left_out)} {noun}: peaks and notches, and"
+    return {"drawn": f"{text} what a screen shows of the rest."}
 
 
 def thin(x: FloatArray, curves: Sequence[FloatArray], n_bins: int) -> IntArray:
@@ -127,6 +144,48 @@ def thin(x: FloatArray, curves: Sequence[FloatArray], n_bins: int) -> IntArray:
     return np.unique(np.concatenate(points))
 
 
+def straighten(x: FloatArray, curves: Sequence[FloatArray], longest: int) -> IntArray:
+    """Leave out points of curves that straight lines between the others show as well, to within half a row of a screen.
+
+    Lines are straight on a linear and on a logarithmic axis of x alike. They stand for 2, 4, 8 and so on points, from
+    the first one on, so that few steps do for long curves.
+
+    Parameters
+    ----------
+    x : (n_points,) array
+        Ascending: frequencies, times.
+    curves : sequence of (n_points,) array
+        What is drawn, as it is drawn. Beside a value that is not known all points stay.
+    longest : int
+        The most points that one line stands for, a power of 2.
+
+    Returns
+    -------
+    (n_kept,) int array
+        Points to draw, ascending, both ends among them.
+
+    Examples
+    --------
+    >>> x = np.arange(1.0, 66.0)
+    >>> straighten(x, [np.zeros(65), np.where(x == 40, 1.0, 0.0)], 32).tolist()
+    [0, 32, 36, 38, 39, 40, 48, 64]
+    """
+    places, is_kept = np.arange(len(x)), np.ones(len(x), bool)
+    axes = (x, np.log(np.maximum(x, x[x > 0][0])))
+    rows = [(curve, (np.nanmax(curve) - np.nanmin(curve)) / ROWS) for curve in curves if np.isfinite(curve).any()]
+    step = longest
+    while step > 1:
+        ends = np.unique(np.append(places[::step], places[-1]))
+        is_straight = np.ones(len(ends), bool)
+        for curve, row in rows:
+            for axis in axes:
+                off = np.abs(curve - np.interp(axis, axis[ends], curve[ends]))
+                is_straight &= np.maximum.reduceat(np.where(np.isfinite(curve), off, np.inf), ends) <= row / 2
+        is_kept &= ~is_straight[np.searchsorted(ends, places, side="right") - 1] | np.isin(places, ends)
+        step //= 2
+    return np.flatnonzero(is_kept)
+
+
 def _bin_starts(x: FloatArray, n_bins: int) -> IntArray:
     low, high = x[x > 0][0], x[-1]
     logarithmic = int(n_bins * LOGARITHMIC)
@@ -153,9 +212,14 @@ def _thinned_points(panel: Panel, n_points: int) -> dict[int, IntArray]:
     groups = {key: layers for key, layers in groups.items() if _is_a_curve(layers)}
     chosen: dict[int, IntArray] = {}
     for layers in groups.values():
-        curves = _curves_of(layers, is_logarithmic=panel.y.scale == "log" or layers == [panel.backdrop])
+        is_logarithmic = panel.y.scale == "log" or layers == [panel.backdrop]
+        curves = _curves_of(layers, is_logarithmic=is_logarithmic)
         n_bins = int(np.clip(n_points // (2 * len(groups) * len(curves)), *BINS))
-        points = thin(np.asarray(layers[0].x, float), curves, n_bins)
+        x = np.asarray(layers[0].x, float)
+        points = thin(x, curves, n_bins)
+        drawn = [*curves, *_sides_of(layers, is_logarithmic=is_logarithmic)]
+        has_dots = any(isinstance(layer, Points) for layer in layers)
+        points = points[straighten(x[points], [curve[points] for curve in drawn], LONGEST[has_dots])]
         chosen |= {id(layer): points for layer in layers}
     return chosen
 
@@ -168,11 +232,18 @@ def _is_a_curve(layers: Sequence[Layer]) -> bool:
 
 def _curves_of(layers: Sequence[Layer], *, is_logarithmic: bool) -> list[FloatArray]:
     values = [np.asarray(layer.y, float) for layer in layers if isinstance(layer, Line | Points)]
-    if not values:
-        values = [side for layer in layers if isinstance(layer, Band) for side in (layer.low, layer.high)]
+    return _as_drawn(values, is_logarithmic=is_logarithmic) or _sides_of(layers, is_logarithmic=is_logarithmic)
+
+
+def _sides_of(layers: Sequence[Layer], *, is_logarithmic: bool) -> list[FloatArray]:
+    sides = [side for layer in layers if isinstance(layer, Band) for side in (layer.low, layer.high)]
+    return _as_drawn(sides, is_logarithmic=is_logarithmic)
+
+
+def _as_drawn(curves: Sequence[FloatArray], *, is_logarithmic: bool) -> list[FloatArray]:
     if not is_logarithmic:
-        return values
-    return [np.log10(np.maximum(curve, np.finfo(float).tiny)) for curve in values]
+        return list(curves)
+    return [np.log10(np.maximum(curve, np.finfo(float).tiny)) for curve in curves]
 
 
 def _thinned(layer: Layer, points: IntArray | None) -> Layer:

@@ -20,7 +20,7 @@ from frf_ipz.plotting.picture import (
     VerticalLines,
     in_hover,
 )
-from frf_ipz.report.plotly_drawing import BINS, POINTS, draw_picture, thin
+from frf_ipz.report.plotly_drawing import BINS, LONGEST, POINTS, ROWS, draw_picture, straighten, thin
 from synthetic_run import many_frfs
 
 N_BINS = 300
@@ -75,6 +75,37 @@ def test_values_that_are_not_known_count_as_none():
 
 def test_short_curves_stay_whole():
     assert len(thin(np.arange(1.0, 400.0), [np.zeros(399)], N_BINS)) == 399
+
+
+@pytest.mark.parametrize("axis", [np.asarray, np.log])
+def test_lines_between_the_points_that_are_left_stay_within_half_a_row_of_the_curve(axis):
+    s = 2j * np.pi * np.linspace(5.0, 1000.0, 3_000)
+    frf = sum(s**2 / (s**2 + 2 * 0.003 * w * s + w**2) for w in (300.0, 1_100.0, 4_000.0))
+    curve, x = np.log10(np.abs(frf)), s.imag / (2 * np.pi)
+    kept = straighten(x, [curve], LONGEST[False])
+    assert len(kept) < len(x) / 6
+    off = np.abs(np.interp(axis(x), axis(x[kept]), curve[kept]) - curve)
+    assert off.max() <= np.ptp(curve) / ROWS / 2
+    assert {int(np.argmax(curve)), 0, len(x) - 1} <= set(kept.tolist())
+    assert np.diff(kept).max() == LONGEST[False]
+
+
+def test_what_is_not_known_and_the_points_beside_it_stay():
+    x = np.arange(1.0, 101.0)
+    curve = np.where((x > 40) & (x < 50), np.nan, 1.0)
+    assert set(range(40, 50)) <= set(straighten(x, [curve], LONGEST[False]).tolist())
+
+
+def test_a_picture_says_how_many_lines_it_draws_of_how_many():
+    x = np.linspace(1.0, 1000.0, 50_000)
+    noise = np.random.default_rng(8).standard_normal(len(x))
+    lines = [Line(name=name, colour=0, frf=frf, x=x, y=y) for frf, (name, y) in enumerate((("a", noise), ("b", 0 * x)))]
+    picture = draw_picture(picture_of(*lines, x=Axis(title="Frequency, Hz", is_frequency=True)))
+    drawn = sorted(len(trace["x"]) for trace in picture["data"])
+    said = "A curve is drawn through {} to {} of 50000 lines: peaks and notches, and what a screen shows of the rest."
+    assert picture["drawn"] == said.format(*drawn)
+    assert drawn[0] < drawn[1] < 5_000
+    assert "drawn" not in draw_picture(picture_of(Line(name="c", colour=0, x=x[:40], y=noise[:40])))
 
 
 def picture_of(*layers, y=None, x=None):

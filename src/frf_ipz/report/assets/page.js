@@ -121,6 +121,7 @@
     const figure = document.getElementById(name);
     const picture = pictureIn(figure);
     const plot = figure.querySelector(".plot");
+    figure.querySelector(".drawn").textContent = picture.drawn || "";
     plot.dataset.height ??= parseFloat(plot.style.height);
     plot.style.height = `${plot.dataset.height * (printing ? PRINT_SHARE : legendShare(plot, picture))}px`;
     const config = { responsive: !printing, ...NO_CLOUD, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] };
