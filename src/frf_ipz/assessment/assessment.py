@@ -51,6 +51,8 @@ class Check:
         What was found, with the reason for the limit.
     advice : str
         What to do; empty where there is nothing to be done.
+    is_answered : bool
+        False where nothing was looked at: it costs nothing then, and speaks for nothing either.
 
     Examples
     --------
@@ -71,6 +73,12 @@ class Check:
     where: str = ""
     says: str = ""
     advice: str = ""
+    is_answered: bool = True
+
+    @property
+    def outcome(self) -> str:
+        """The verdict in words, and that there is none of what was not looked at."""
+        return self.verdict.value if self.is_answered else "no answer"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

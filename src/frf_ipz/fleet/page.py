@@ -187,7 +187,7 @@ def _poles(analysis: FleetAnalysis) -> Section | None:
         blocks=(Figure(picture=picture), _spread_table(analysis.poles, "Modes", "fleet_poles.parquet")),
         notes=(
             "In a fleet without a faulty machine, whose machines scatter normally, the probability that any pole or "
-            f"zero of any machine is marked is at most {FALSE_ALARMS:.0%}.",
+            f"zero of any machine is marked is at most {100 * FALSE_ALARMS:.0f} %.",
         ),
     )
 
@@ -272,7 +272,7 @@ def _drift(analysis: FleetAnalysis) -> Section | None:
         blocks=tuple(blocks),
         notes=(
             f"Rank correlation of Kendall; without any drift the probability that one is marked is at most "
-            f"{FALSE_ALARMS:.0%}.",
+            f"{100 * FALSE_ALARMS:.0f} %.",
         ),
     )
 
@@ -291,5 +291,5 @@ def _population(analysis: FleetAnalysis) -> Section | None:
         f"outliers left out, are in {POPULATION}; models of such machines, for a controller that has to suit all of "
         f"them, in {ENSEMBLE}.",
         blocks=tuple(Figure(picture=draw_population(population, names)) for names in ratios),
-        choices=(f"correlations over machines are shrunk by {population.shrinkage:.0%}",),
+        choices=(f"correlations over machines are shrunk by {100 * population.shrinkage:.0f} %",),
     )

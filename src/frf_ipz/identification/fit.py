@@ -286,7 +286,7 @@ def _warnings(
         which = "every FRF" if alone.all() else f"{alone.sum()} of {len(alone)} FRFs"
         texts.append(
             f"one impact stands behind {which}: how the next would differ is not seen, so that the fit counts on "
-            f"{ONE_IMPACT:.0%} of the FRF, in common over the width of a peak; three impacts or more show it"
+            f"{100 * ONE_IMPACT:.0f} % of the FRF, in common over the width of a peak; three impacts or more show it"
         )
     ratio = fitted.misfit_ratio
     if np.median(ratio) > MODEL_ERROR:

@@ -94,7 +94,13 @@ def describe_frfs(
 
 def _variance_source(frfs: FrfSet) -> str:
     """Say where the variance comes from: one record has no scatter, and neither have FRFs from elsewhere."""
-    return "from the scatter between records" if (frfs.averages > 1).any() else "as stated with the FRFs"
+    sources = {
+        "from the scatter between records": frfs.averages > 1,
+        "from the noise within the one record there is, which does not show how the next would differ": frfs.averages
+        == 1,
+        "as stated with the FRFs": frfs.averages < 1,
+    }
+    return ", or ".join(source for source, frfs_of_it in sources.items() if frfs_of_it.any())
 
 
 def _magnitude_limits(frfs: FrfSet, band_hz: tuple[float, float]) -> tuple[float, float] | None:

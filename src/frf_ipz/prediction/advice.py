@@ -23,6 +23,7 @@ WIDE_DB = 3.0  # half the 90 % band from which it is wide
 JOINED = 0.05  # relative gap over which two wide bands are one
 MIN_LINES = 3  # of a wide band worth a warning
 MAX_BANDS = 3  # an FRF: the widest are named
+MOST_PLACES = 6  # that a text names, of bands that have their reason in common
 MAX_CANDIDATES = 40  # DOFs tried for a further sensor or excitation
 TRIED_LINES = 12  # of a wide band
 AMPLITUDE_NOISE = 0.03  # relative error of a mode's amplitude from a further measurement
@@ -78,20 +79,20 @@ def wide_bands(frequency_hz: FloatArray, low: FloatArray, high: FloatArray) -> t
     return tuple(bands)
 
 
-def explain_wide_band(
-    band: WideBand,
+def explain_wide_bands(
+    bands: Sequence[WideBand],
     updated_model: ReducedModel,
     ensemble: ModelEnsemble,
     measured: Sequence[FrfLabel],
-    predicted: FrfLabel,
+    predicted: Sequence[FrfLabel],
     frequency_hz: FloatArray,
     zeros: ZeroSet,
-) -> str:
-    """Say why a band is wide, and what would narrow it most.
+) -> tuple[str, ...]:
+    """Say why bands are wide, and what would narrow them most: once for all that have reason and remedy in common.
 
     Parameters
     ----------
-    band : WideBand
+    bands : sequence of WideBand
         The lines.
     updated_model : ReducedModel
         The updated model.
@@ -99,8 +100,8 @@ def explain_wide_band(
         Models drawn from what targets and prior leave open.
     measured : sequence of FrfLabel
         What was measured.
-    predicted : FrfLabel
-        The FRF with the wide band.
+    predicted : sequence of FrfLabel
+        The FRFs of the bands.
     frequency_hz : (n_lines,) array
         Hz.
     zeros : ZeroSet
@@ -108,18 +109,40 @@ def explain_wide_band(
 
     Returns
     -------
-    str
-        One sentence or two.
+    tuple of str
+        The widest bands first.
     """
-    lines = band.lines[np.unique(np.linspace(0, len(band.lines) - 1, TRIED_LINES).astype(int))]
-    s = 2j * np.pi * frequency_hz[lines]
-    deviations = _log_deviations(ensemble, updated_model, predicted, s)
-    low, high = frequency_hz[band.lines[[0, -1]]]
-    text = (
-        f"{predicted}: from {low:.4g} to {high:.4g} Hz the 90 % band is up to {band.half_width_db:.0f} dB "
-        f"to each side, {_reason(band, updated_model, ensemble, predicted, deviations, frequency_hz, zeros)}"
+    alike: dict[str, list[tuple[WideBand, str]]] = {}
+    for band in sorted(bands, key=lambda band: -band.half_width_db):
+        lines = band.lines[np.unique(np.linspace(0, len(band.lines) - 1, TRIED_LINES).astype(int))]
+        label = predicted[band.frf]
+        deviations = _log_deviations(ensemble, updated_model, label, 2j * np.pi * frequency_hz[lines])
+        reason = _reason(band, updated_model, ensemble, label, deviations, frequency_hz, zeros)
+        alike.setdefault(reason, []).append((band, _advice(updated_model, ensemble, measured, label, deviations)))
+    return tuple(
+        f"the 90 % band is up to {group[0][0].half_width_db:.0f} dB to each side {reason}: "
+        f"{_places([band for band, _ in group], predicted, frequency_hz)}; {_remedy(group, predicted, frequency_hz)}"
+        for reason, group in alike.items()
     )
-    return f"{text}; {_advice(updated_model, ensemble, measured, predicted, deviations)}"
+
+
+def _remedy(group: Sequence[tuple[WideBand, str]], predicted: Sequence[FrfLabel], frequency_hz: FloatArray) -> str:
+    """Give the first advice there is, and for which band where there are several."""
+    for band, advice in group:
+        if advice:
+            return advice if len(group) == 1 else f"for {_places([band], predicted, frequency_hz)} {advice}"
+    return f"no single further sensor or excitation would narrow {'it' if len(group) == 1 else 'any of them'} by much"
+
+
+def _places(bands: Sequence[WideBand], predicted: Sequence[FrfLabel], frequency_hz: FloatArray) -> str:
+    """Name FRFs and lines of bands, the widest first."""
+    places: dict[str, list[str]] = {}
+    for band in bands[:MOST_PLACES]:
+        low, high = frequency_hz[band.lines[[0, -1]]]
+        places.setdefault(str(predicted[band.frf]), []).append(f"{low:.4g} to {high:.4g} Hz")
+    text = ", ".join(f"{label} from {' and '.join(parts)}" for label, parts in places.items())
+    rest = len(bands) - MOST_PLACES
+    return f"{text} and {rest} more" if rest > 0 else text
 
 
 def _log_deviations(ensemble: ModelEnsemble, updated_model: ReducedModel, label: FrfLabel, s: np.ndarray) -> FloatArray:
@@ -142,7 +165,7 @@ def _reason(
     hertz = np.abs(zeros.values) / (2 * np.pi)
     inside = (zeros.frf == band.frf) & (hertz > low) & (hertz < high)
     if inside.any():
-        return f"as the zero at {hertz[inside][0]:.4g} Hz depends on shapes that the measured points do not determine"
+        return "about zeros that depend on shapes which the measured points do not determine"
     count = int(np.count_nonzero(np.sqrt(ensemble.modes[0].mean(axis=0)) < 4 * np.pi * frequency_hz[-1])) or 1
     amplitudes = ensemble.amplitudes(
         updated_model.row(predicted.output_dof), updated_model.row(predicted.input_dof), count
@@ -152,7 +175,7 @@ def _reason(
     share = np.abs(amplitudes.T @ deviations).max(axis=1) / np.maximum(size, np.finfo(float).tiny)
     mode = int(np.argmax(share))
     hertz_of_mode = float(np.sqrt(ensemble.modes[0][:, mode].mean()) / (2 * np.pi))
-    return f"as the shape of the mode at {hertz_of_mode:.4g} Hz is not determined there"
+    return f"where the shape of the mode at {hertz_of_mode:.4g} Hz is not determined"
 
 
 def _advice(
@@ -162,6 +185,7 @@ def _advice(
     predicted: FrfLabel,
     deviations: FloatArray,
 ) -> str:
+    """Say what would narrow a band most, and by how much; nothing where nothing does."""
     before = float(np.sqrt(np.mean(deviations**2)))
     best, advice = before, ""
     for text, output, force in _candidates(updated_model, measured, predicted):
@@ -170,7 +194,7 @@ def _advice(
         if after < best:
             best, advice = after, text
     if not advice or best > 0.9 * before:
-        return "no single further sensor or excitation would narrow it by much"
+        return ""
     return f"{advice} would narrow it most, from {Q95 * before:.1f} to about {Q95 * best:.1f} dB on the mean"
 
 

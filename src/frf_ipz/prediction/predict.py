@@ -19,7 +19,7 @@ from frf_ipz.fe.response import compute_frfs
 from frf_ipz.frf import FrfLabel, Measured, require_measured
 from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.numerics.one_thread import on_one_thread
-from frf_ipz.prediction.advice import explain_wide_band, wide_bands
+from frf_ipz.prediction.advice import explain_wide_bands, wide_bands
 from frf_ipz.prediction.ensemble import ModelEnsemble
 from frf_ipz.prediction.model_error import as_ensemble, estimate_model_error, frf_rows, frf_sizes
 from frf_ipz.prediction.prediction import Prediction
@@ -104,10 +104,9 @@ def predict_frfs(
     low, high = _magnitude_bands(measured, updated, ensemble, predicted, s)
     zeros, zero_std = predicted_zeros(updated.model, updated.ensemble, predicted, band_rad_s)
     statement = updated.scale.statement if predicted else ""
-    warnings = (statement,) * bool(statement) + tuple(
-        explain_wide_band(band, updated.model, ensemble, labels, predicted[band.frf], frequency_hz, zeros)
-        for band in wide_bands(frequency_hz, low, high)
-    )
+    bands = wide_bands(frequency_hz, low, high)
+    notes = explain_wide_bands(bands, updated.model, ensemble, labels, predicted, frequency_hz, zeros)
+    warnings = (statement,) * bool(statement) + notes
     return Prediction(
         frequency_hz=frequency_hz,
         labels=predicted,

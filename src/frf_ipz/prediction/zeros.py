@@ -151,7 +151,7 @@ def _reason(value: complex, spread: FloatArray) -> str:
     if np.isnan(spread[2]):
         return ""
     if spread[2] < MIN_SHARE:
-        return f"{1 - spread[2]:.0%} of the models that fit the measurements have no such zero"
+        return f"{100 * (1 - spread[2]):.0f} % of the models that fit the measurements have no such zero"
     if spread[1] > MAX_STD * abs(value):
-        return f"the measurements determine it to {spread[1] / abs(value):.0%} of its frequency only"
+        return f"the measurements leave it open by {100 * spread[1] / abs(value):.0f} % of its frequency"
     return ""

@@ -283,6 +283,22 @@ def test_what_a_diagnosis_found_is_said(evidence, is_explained, findings, is_cor
 def test_a_diagnosis_that_was_not_made_is_said(evidence):
     check = the(quality.diagnosis, evidence)
     assert (check.verdict, check.says) == (USABLE, "not looked for")
+    assert (check.outcome, the(quality.fit, evidence).outcome) == ("no answer", "usable")
+
+
+def test_an_update_that_is_worse_at_the_point_of_interest_is_no_better_than_before(evidence):
+    """Though it is better at the measured points: the figures are those that the first screen shows."""
+    off = reference(evidence, 1.0)
+    predicted = evidence.prediction
+    beyond = predicted.nominal * (predicted.nominal / predicted.values) ** 1.5  # further from the updated model
+    nominal = replace(off, values=beyond, variance=off.variance)
+    check = the(agreement.improvement, replace(evidence, reference=nominal))
+    point = replace(evidence, reference=nominal).point_deviation
+    assert point.updated_db > 1.0 > point.nominal_db  # dB, of a controller's sixth of the margin
+    assert (check.verdict, check.figure, check.limit) == (WITH_CARE, point.updated_db, point.nominal_db)
+    assert (check.where, point.figures in check.says) == (point.frf, True)
+    sound = the(agreement.improvement, replace(evidence, reference=off))
+    assert (sound.verdict, sound.where) == (USABLE, "all measured FRFs")
 
 
 def test_the_worst_check_stands_first():

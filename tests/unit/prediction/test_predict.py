@@ -140,6 +140,24 @@ def test_the_sensor_that_is_advised_narrows_the_band():
     assert node in {3, 4, 99} or "excitation" in text
 
 
+def test_bands_that_are_wide_for_one_reason_are_one_note_with_their_places():
+    """Nine points with the same zero that nothing determines: one note, of which every FRF can be read."""
+    model = chain(between=True)
+    points = tuple(Dof(node, "x") for node in (4, 5))
+    prediction = predict_frfs(
+        measured((label(2, 1),)), updated(model, local_spread(model)), points=points, frequency_hz=LINES
+    )
+    reasons = [text.split(": ")[0].split("to each side ")[1] for text in prediction.warnings]
+    assert len(set(reasons)) == len(reasons)
+    widths = [int(text.split("up to ")[1].split(" ")[0]) for text in prediction.warnings]
+    assert widths == sorted(widths, reverse=True)
+    bands = wide_bands(LINES, prediction.magnitude_low, prediction.magnitude_high)
+    assert len(bands) > len(reasons)
+    assert {str(prediction.labels[band.frf]) for band in bands} == {
+        name for name in map(str, prediction.labels) if any(name in text for text in prediction.warnings)
+    }
+
+
 def test_wide_bands_are_joined_and_short_ones_omitted():
     lines = np.linspace(10.0, 20.0, 101)
     high = np.ones((101, 1))

@@ -176,7 +176,7 @@ def _median_angle(turned: ComplexArray, is_heard: BoolArray) -> float:
 
 
 def improvement(evidence: Evidence) -> Iterator[Check]:
-    """Ask whether updating has made the model better where it was measured.
+    """Ask whether updating has made the model better: over all measured FRFs, and at a point of interest that is known.
 
     Parameters
     ----------
@@ -195,20 +195,32 @@ def improvement(evidence: Evidence) -> Iterator[Check]:
     if not np.isfinite(after):
         return
     noise = float(np.median(20 * np.log10(1 + (evidence.noise / np.abs(evidence.measured))[evidence.is_heard])))
-    is_worse = after > before + noise and after > SIXTH * GAIN_MARGIN_DB
+    where, worst, point = "all measured FRFs", evidence.deviation, evidence.point_deviation
     says = (
         f"over all {evidence.frfs.n_frfs} measured FRFs ({evidence.band_text}, median) the model is off by "
         f"{before:.2g} dB before updating, {after:.2g} dB after"
     )
+    if worst is not None and worst.updated_db > worst.nominal_db + noise:
+        says += f"; the worst of them, {worst.frf}, by {worst.figures}"
+    if point is not None and _is_worse(point.nominal_db, point.updated_db, noise):
+        before, after, where = point.nominal_db, point.updated_db, point.frf
+        says += f"; at the point of interest, {point.where}, by {point.figures}"
+    is_worse = _is_worse(before, after, noise)
     yield Check(
         name="better than before",
         verdict=Verdict.WITH_CARE if is_worse else Verdict.USABLE,
         figure=after,
         limit=before,
         unit="dB",
+        where=where,
         says=says + (": updating has made it worse" if is_worse else ""),
         advice="look at the pairs, and for what the model leaves out: frf-ipz diagnose" if is_worse else "",
     )
+
+
+def _is_worse(before: float, after: float, noise: float) -> bool:
+    """Tell whether a deviation has grown beyond noise, to one that a controller feels; all in dB."""
+    return after > before + noise and after > SIXTH * GAIN_MARGIN_DB
 
 
 def own_band(evidence: Evidence) -> Iterator[Check]:
@@ -237,11 +249,11 @@ def own_band(evidence: Evidence) -> Iterator[Check]:
     is_felt = evidence.decibels(evidence.updated) > SIXTH * GAIN_MARGIN_DB  # False where an FRF is not heard
     outside = float(np.mean((~inside & is_felt)[evidence.is_heard]))
     verdict = judge(outside, 1 - INSIDE, 1 - MOSTLY_OUTSIDE)
-    says = f"the 90 % band of the updated model holds {share:.0%} of the lines of the FRFs that were measured"
+    says = f"the 90 % band of the updated model holds {100 * share:.0f} % of the lines of the FRFs that were measured"
     if verdict is not Verdict.USABLE:
         says += ", so at the points of interest it is too narrow too"
     elif share < INSIDE:
-        says += f"; on {1 - share - outside:.0%} it misses by less than {SIXTH * GAIN_MARGIN_DB:g} dB"
+        says += f"; on {100 * (1 - share - outside):.0f} % it misses by less than {SIXTH * GAIN_MARGIN_DB:g} dB"
         says += ", which is nothing to a controller"
     yield Check(
         name="measured FRFs in the band",

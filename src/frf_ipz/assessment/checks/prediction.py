@@ -83,7 +83,7 @@ def reference(evidence: Evidence) -> Iterator[Check]:
     inside = judge(1 - share, 1 - INSIDE, 1 - MOSTLY_OUTSIDE) if np.isfinite(share) else Verdict.USABLE
     if inside is not Verdict.USABLE and verdict is Verdict.USABLE:
         verdict = Verdict.WITH_CARE  # close to what was measured, though the band says closer
-    text = f"; its 90 % band holds {share:.0%} of the lines" if np.isfinite(share) else ""
+    text = f"; its 90 % band holds {100 * share:.0f} % of the lines" if np.isfinite(share) else ""
     text += " (compared in shape: the level is not known)" if prediction.relative else ""
     yield Check(
         name="reference at the points of interest",

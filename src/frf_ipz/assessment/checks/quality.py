@@ -167,4 +167,4 @@ def diagnosis(evidence: Evidence) -> Iterator[Check]:
             advice = "put it into the model, or set [diagnose] apply = true"
     else:
         says, verdict, advice = "nothing significant is missing in the model", Verdict.USABLE, ""
-    yield Check(name="diagnosis", verdict=verdict, says=says, advice=advice)
+    yield Check(name="diagnosis", verdict=verdict, says=says, advice=advice, is_answered=found is not None)

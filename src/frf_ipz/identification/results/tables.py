@@ -132,7 +132,7 @@ def _level_at(goodness: GoodnessOfFit, poles: ComplexArray) -> FloatArray:
 def _remarks(rows: dict[str, FloatArray], number: int, confused: float) -> list[str]:
     remarks = []
     if rows["damping_std_ratio"][number] > GOOD_DAMPING:
-        remarks.append(f"damping known to {rows['damping_std_ratio'][number]:.0%}")
+        remarks.append(f"damping uncertain by {100 * rows['damping_std_ratio'][number]:.2g} %")
     if rows["significance"][number] < GOOD_SIGNIFICANCE:
         remarks.append("hardly more than the data ask for")
     if rows["mpc"][number] < COLLINEAR:

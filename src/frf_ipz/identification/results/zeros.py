@@ -211,7 +211,7 @@ def _reason(outside: np.bool_, in_gap: np.bool_, std: float, modulus: float, nex
     if in_gap:
         return "lies where lines were left out"
     if not std < MAX_STD * modulus:
-        return f"known to {std / modulus:.0%} only"
+        return f"its deviation is {100 * std / modulus:.2g} % of it"
     if SEPARATION * std > next_pole:
         return "cannot be distinguished from the nearest pole"
     if SEPARATION * std > next_zero:

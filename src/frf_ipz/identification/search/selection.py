@@ -303,9 +303,9 @@ def _spurious_reasons(search: _Search, fit: RefinedPoles, goodness: GoodnessOfFi
 
 def _reason(goodness: GoodnessOfFit, number: int, spurious: str) -> str:
     if goodness.significance[number] < 1:
-        return f"takes off the misfit {goodness.significance[number]:.2g} of what the BIC demands"
+        return f"makes the misfit smaller by {goodness.significance[number]:.2g} times what the BIC demands of a mode"
     if not spurious and goodness.damping_std[number] > UNCERTAIN:
-        return f"its damping is known to {goodness.damping_std[number]:.0%} only"
+        return f"its damping is uncertain by {100 * goodness.damping_std[number]:.2g} %"
     return spurious
 
 

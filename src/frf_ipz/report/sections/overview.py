@@ -17,7 +17,7 @@ from frf_ipz.runs.picture_data import update_targets
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from frf_ipz.assessment.assessment import Assessment
+    from frf_ipz.assessment.assessment import Assessment, Check
     from frf_ipz.runs.results import Results
     from frf_ipz.updating.targets import Target
 
@@ -76,7 +76,10 @@ def verdict(run: Results) -> tuple[str, str]:
         The verdict in a sentence, and what there is to add.
     """
     parts = [] if run.assessment is None else [assessment_sentence(run.assessment)]
-    parts += list(verdict_of(run.diagnosis)) if run.diagnosis is not None and "diagnose" not in run.stale else []
+    if run.diagnosis is not None and "diagnose" not in run.stale:
+        sentence, addition = verdict_of(run.diagnosis)
+        is_said = not run.diagnosis.is_explained and _is_said(run.assessment, "diagnosis")
+        parts += [addition] if is_said else [sentence, addition]
     if run.updated_model is not None and run.pairs is not None:
         parts.append(_of_update(run))
     elif run.fit is not None:
@@ -111,6 +114,13 @@ def assessment_sentence(assessment: Assessment) -> str:
     return f"{word}: {costly[0].says}." if costly else f"{word}: all checks are within their limits."
 
 
+def _is_said(assessment: Assessment | None, name: str) -> bool:
+    """Tell whether the sentence of the assessment is that of a check."""
+    if assessment is None or assessment.likely_cause is not None:
+        return False
+    return any(check.name == name for check in assessment.costly[:1])
+
+
 def _checks(run: Results) -> list[Table]:
     """List the checks of the assessment, the worst first."""
     if run.assessment is None:
@@ -119,22 +129,30 @@ def _checks(run: Results) -> list[Table]:
     rows = [
         (
             check.name,
-            check.verdict.value,
+            check.outcome,
             _figure(check.figure, check.unit),
             _figure(check.limit, check.unit),
             check.where,
+            _words(check),
         )
         for check in checks
     ]
     return [
         Table(
             caption="What the verdict rests on",
-            columns=("check", "verdict", "figure", "limit", "where"),
+            columns=("check", "verdict", "figure", "limit", "where", "what to know, what to do"),
             rows=rows,
             marked=frozenset(range(len(run.assessment.costly))),  # the worst stand first
             file="run.json",
         )
     ]
+
+
+def _words(check: Check) -> str:
+    """Say what costs the verdict, or was not looked at, and what to do; figures say enough of the others."""
+    if check.verdict is Verdict.USABLE and check.is_answered:
+        return ""
+    return f"{check.says}: {check.advice}" if check.advice else check.says
 
 
 def _figure(value: float, unit: str) -> str:

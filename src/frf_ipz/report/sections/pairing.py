@@ -8,7 +8,7 @@ import numpy as np
 
 from frf_ipz.pairing.pairs import Pair, PairVerdict
 from frf_ipz.plotting.poles import pair_name
-from frf_ipz.plotting.wording import number, percent
+from frf_ipz.plotting.wording import NOTHING, number, percent
 from frf_ipz.rational import natural_frequency_hz
 from frf_ipz.report.section import Section, Table, run_figures
 
@@ -50,10 +50,13 @@ def _table(run: Results, rows: Sequence[Pair]) -> Table:
     cells = []
     for row in rows:
         measured, computed = _hertz(row.measured_value), _hertz(row.computed_value)
+        has_number = (
+            row.kind == "pole" or row.measured < 0 or run.fit is None or bool(run.fit.zeros.identifiable[row.measured])
+        )
         cells.append(
             [
                 pair_name(row, run.labels),
-                number(measured, 6),
+                number(measured, 6) if has_number else NOTHING,
                 number(computed, 6),
                 percent(computed / measured - 1),
                 number(row.distance, 3),
