@@ -21,6 +21,7 @@ EPILOG = """
   frf-ipz check FOLDER                   validates everything and draws the set-up
   frf-ipz run FOLDER --out RESULTS
   frf-ipz show RESULTS                   opens the results as a page to look at and to work on
+  frf-ipz compare RESULTS LATER_RESULTS  says which modes have moved between two tests
 
 [bold]Exit status[/bold]  0 done; 2 the input is wrong, one message says where and what to do; 1 no result could be
 computed, or a fault of the program.
@@ -104,6 +105,26 @@ def fleet(
     from frf_ipz.cli.terminal import run_fleet_with_progress
 
     run_fleet_with_progress(fleet, out, jobs=jobs, scheduler=scheduler, only=only, quiet=quiet)
+
+
+@app.command()
+def compare(
+    before: Annotated[Path, typer.Argument(metavar="BEFORE", help="Folder with the results of the test before.")],
+    after: Annotated[Path, typer.Argument(metavar="AFTER", help="Folder with the results of the test after.")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for compare.html and compare.csv.")
+    ] = Path(),
+    frequency_scatter: Annotated[
+        float | None, typer.Option(metavar="RATIO", help="Of frequencies from test to test with nothing changed.")
+    ] = None,
+    damping_scatter: Annotated[
+        float | None, typer.Option(metavar="RATIO", help="Of damping ratios from test to test with nothing changed.")
+    ] = None,
+) -> None:
+    """Say which modes have moved from one test of a structure to another: compare.html, compare.csv."""
+    from frf_ipz.cli.comparison import compare_folders
+
+    say(compare_folders(before, after, out, frequency_scatter=frequency_scatter, damping_scatter=damping_scatter))
 
 
 @app.command()
