@@ -73,6 +73,10 @@ from .fe.model_file import read_model as read_model
 from .fe.reduction.options import ReduceOptions as ReduceOptions
 from .fe.reduction.reduce import reduce_model as reduce_model
 from .fe.response import compute_frfs as compute_frfs
+from .fleet.mode_changes import ModeChange as ModeChange
+from .fleet.mode_changes import ModeOutcome as ModeOutcome
+from .fleet.mode_changes import RunComparison as RunComparison
+from .fleet.mode_changes import compare_runs as compare_runs
 from .fleet.results import FleetResults as FleetResults
 from .fleet.results import open_fleet as open_fleet
 from .fleet.run import run_fleet as run_fleet

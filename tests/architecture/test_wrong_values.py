@@ -57,6 +57,7 @@ def good():
         test=test,
         state=state,
         modes=frf_ipz.solve_modes(beam, n_modes=3),
+        run=frf_ipz.Campaign(frfs).run(),
         diagnosis=frf_ipz.diagnose(frfs, beam, options=frf_ipz.DiagnoseOptions(effects=("added_mass",))),
     )
 
@@ -75,6 +76,10 @@ def calls():
         "compare_frfs": (
             {"first": np.ones((2, 1)), "second": np.ones((2, 1))},
             {"second": [np.ones((3, 1)), np.ones(2)]},
+        ),
+        "compare_runs": (
+            {"before": g.run, "after": g.run},
+            {"before": ["results", 3], "frequency_scatter": [-1.0, np.nan, "text", True], "damping_scatter": [np.inf]},
         ),
         "compare_states": ({"before": g.state, "after": g.state}, {"before": [[], [g.state, 3]]}),
         "compute_frfs": (

@@ -103,7 +103,7 @@ def _overview(comparison: RunComparison) -> Section:
     blocks += [Figure(picture=_changes(comparison))] if comparison.common else []
     blocks += [Cards(tuple(cards)), _table(comparison)]
     choices = (
-        f"a change counts from {number(comparison.limit_sigma, 2)} deviations on: of twenty comparisons in which nothing "
+        f"a change counts from {number(comparison.limit_sigma, 2)} deviations on: of twenty comparisons where nothing "
         "has changed one shows such a change",
         "deviations are those of the noise in both tests and, from test to test with nothing changed, "
         f"{number(100 * comparison.frequency_scatter, 2)} % of a frequency and "

@@ -204,7 +204,7 @@ class RunComparison(Concise):
 
     @property
     def limit_sigma(self) -> float:
-        """Standard deviations beyond which a change is no chance: one in twenty comparisons of equals has such a one."""
+        """Standard deviations beyond which a change is no chance: one in twenty comparisons of equals has one."""
         return float(special.ndtri(1 - FALSE_ALARMS / (4 * max(len(self.common), 1))))
 
     def summary(self) -> str:

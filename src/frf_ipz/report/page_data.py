@@ -1,7 +1,7 @@
 """What the page's script draws from: pictures as JSON, every array once for the whole page.
 
-Arrays are single-precision bytes in base64. On a page of hundreds of FRFs they are numbers of 16 bits: lines of an even
-spacing are then exact, and curves good to less than a screen shows.
+Arrays are single-precision bytes in base64; what lies on an even spacing, as the lines of FRFs do, is as exact in
+numbers of 16 bits. On a page of hundreds of FRFs all are of 16 bits: curves are then good to less than a screen shows.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from frf_ipz.runs.picture_data import hidden_frfs
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frf_ipz.arrays import FloatArray
     from frf_ipz.report.section import Section
     from frf_ipz.runs.results import Results
 
@@ -122,7 +123,8 @@ class Packer:
         data = np.ascontiguousarray(array, "<f4").tobytes()
         if data not in self._known:
             self._known[data] = len(self.arrays)
-            self.arrays.append(short_numbers(array) if self.is_short else base64.b64encode(data).decode("ascii"))
+            is_short = self.is_short or _spacing(np.asarray(array, float)) > 0
+            self.arrays.append(short_numbers(array) if is_short else base64.b64encode(data).decode("ascii"))
         return self._known[data]
 
 
@@ -149,11 +151,9 @@ def short_numbers(array: np.ndarray[Any, Any]) -> dict[str, Any]:
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
     is_log = low > 0 and np.log10(high / low) > DECADES
-    spacing = np.diff(known)
-    step = float(spacing.min()) if len(spacing) else 0.0
-    counts = (known - low) / step if step > 0 else np.zeros(1)
-    if step > 0 and counts[-1] <= STEPS and np.allclose(counts, np.round(counts), rtol=0, atol=ON_A_LINE):
-        step, is_log = (high - low) / float(np.round(counts[-1])), False
+    step = _spacing(values)
+    if step > 0:
+        is_log = False
     else:
         low, high = (float(np.log(low)), float(np.log(high))) if is_log else (low, high)
         step = (high - low) / STEPS or 1.0
@@ -162,6 +162,17 @@ def short_numbers(array: np.ndarray[Any, Any]) -> dict[str, Any]:
     whole = np.where(np.isfinite(scaled), np.round(scaled / step), STEPS + 1)
     data = base64.b64encode(whole.astype(UINT16).tobytes()).decode("ascii")
     return {"bytes": data, "low": low, "step": step, **({"log": True} if is_log else {})}
+
+
+def _spacing(values: FloatArray) -> float:
+    """Give the spacing of which all numbers are multiples apart, where 16 bits can count them; else 0."""
+    known = np.unique(values[np.isfinite(values)])
+    apart = float(np.diff(known).min()) if len(known) > 1 else 0.0
+    if not apart or known[-1] - known[0] > STEPS * apart:
+        return 0.0
+    counts = (known - known[0]) / apart
+    is_even = np.allclose(counts, np.round(counts), rtol=0, atol=ON_A_LINE)
+    return float((known[-1] - known[0]) / np.round(counts[-1])) if is_even else 0.0
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401  a leaf of such a tree

@@ -43,10 +43,11 @@ Trace: TypeAlias = "dict[str, Any]"
 
 GAP = 0.06  # of the height, between panels
 GAP_BESIDE = 0.08  # of the width
-POINTS = 44_000  # of one kind of curve on the whole page: keeps a page of 900 FRFs below 10 MB
-BINS = (40, 1200)  # of one curve: the fewest that still have its peaks and notches, and as many as a screen has columns
+POINTS = 30_000  # of one kind of curve on the whole page: keeps one of 9 FRFs of 50 000 lines at 2 MB, of 900 below 10
+BINS = (40, 1000)  # of one curve: the fewest that still have its peaks and notches, and as many as a page has columns
+DOTS = 340  # bins of single points: as many as stand beside each other in the columns of a screen
 ROWS = 1200  # of a screen: a curve that stays within half a row of the line drawn instead looks the same
-LONGEST = {False: 32, True: 8}  # points that one line stands for, of curves and of dots: a pointer finds one near it
+FEWEST = 100  # lines that a curve is drawn with: a pointer finds a point near it
 LOGARITHMIC = 0.35  # of the bins are spread evenly over the logarithm of the frequency, the others over the frequency
 MOST_CELLS = 240  # of a map in which the numbers are written
 BESIDE_NAMES_PX = {"x": 30, "y": 10}  # from names of categories to the title of their axis
@@ -144,11 +145,12 @@ def thin(x: FloatArray, curves: Sequence[FloatArray], n_bins: int) -> IntArray:
     return np.unique(np.concatenate(points))
 
 
-def straighten(x: FloatArray, curves: Sequence[FloatArray], longest: int) -> IntArray:
+def straighten(x: FloatArray, curves: Sequence[FloatArray]) -> IntArray:
     """Leave out points of curves that straight lines between the others show as well, to within half a row of a screen.
 
     Lines are straight on a linear and on a logarithmic axis of x alike. They stand for 2, 4, 8 and so on points, from
-    the first one on, so that few steps do for long curves.
+    the first one on, so that few steps do for long curves: resonances keep their points, and what is smooth between
+    them does with few.
 
     Parameters
     ----------
@@ -156,8 +158,6 @@ def straighten(x: FloatArray, curves: Sequence[FloatArray], longest: int) -> Int
         Ascending: frequencies, times.
     curves : sequence of (n_points,) array
         What is drawn, as it is drawn. Beside a value that is not known all points stay.
-    longest : int
-        The most points that one line stands for, a power of 2.
 
     Returns
     -------
@@ -166,24 +166,32 @@ def straighten(x: FloatArray, curves: Sequence[FloatArray], longest: int) -> Int
 
     Examples
     --------
-    >>> x = np.arange(1.0, 66.0)
-    >>> straighten(x, [np.zeros(65), np.where(x == 40, 1.0, 0.0)], 32).tolist()
-    [0, 32, 36, 38, 39, 40, 48, 64]
+    >>> x = np.arange(1.0, 514.0)
+    >>> straighten(x, [np.zeros(513), np.where(x == 40, 1.0, 0.0)])[:12].tolist()
+    [0, 4, 8, 12, 16, 20, 24, 28, 32, 36, 38, 39]
     """
     places, is_kept = np.arange(len(x)), np.ones(len(x), bool)
     axes = (x, np.log(np.maximum(x, x[x > 0][0])))
-    rows = [(curve, (np.nanmax(curve) - np.nanmin(curve)) / ROWS) for curve in curves if np.isfinite(curve).any()]
-    step = longest
+    rows = [(curve, _row(curve)) for curve in curves if np.isfinite(curve).any()]
+    step = 2 ** int(np.log2(max(len(x) / FEWEST, 2)))
     while step > 1:
-        ends = np.unique(np.append(places[::step], places[-1]))
-        is_straight = np.ones(len(ends), bool)
+        first = places - places % step
+        last = np.minimum(first + step, len(x) - 1)
+        is_straight = np.ones(-(-len(x) // step), bool)
         for curve, row in rows:
             for axis in axes:
-                off = np.abs(curve - np.interp(axis, axis[ends], curve[ends]))
-                is_straight &= np.maximum.reduceat(np.where(np.isfinite(curve), off, np.inf), ends) <= row / 2
-        is_kept &= ~is_straight[np.searchsorted(ends, places, side="right") - 1] | np.isin(places, ends)
+                with np.errstate(invalid="ignore", divide="ignore"):  # NaN counts as not straight
+                    part = (axis - axis[first]) / np.where(last > first, axis[last] - axis[first], 1.0)
+                    off = np.abs(curve[first] + part * (curve[last] - curve[first]) - curve)
+                is_straight &= np.maximum.reduceat(np.where(np.isfinite(off), off, np.inf), places[::step]) <= row / 2
+        is_kept &= ~is_straight[places // step] | (places == first) | (places == places[-1])
         step //= 2
     return np.flatnonzero(is_kept)
+
+
+def _row(curve: FloatArray) -> float:
+    """Give what a curve changes by from one row of a screen to the next where it takes up all of them."""
+    return float(np.nanmax(curve) - np.nanmin(curve)) / ROWS
 
 
 def _bin_starts(x: FloatArray, n_bins: int) -> IntArray:
@@ -213,15 +221,44 @@ def _thinned_points(panel: Panel, n_points: int) -> dict[int, IntArray]:
     chosen: dict[int, IntArray] = {}
     for layers in groups.values():
         is_logarithmic = panel.y.scale == "log" or layers == [panel.backdrop]
-        curves = _curves_of(layers, is_logarithmic=is_logarithmic)
-        n_bins = int(np.clip(n_points // (2 * len(groups) * len(curves)), *BINS))
-        x = np.asarray(layers[0].x, float)
-        points = thin(x, curves, n_bins)
-        drawn = [*curves, *_sides_of(layers, is_logarithmic=is_logarithmic)]
-        has_dots = any(isinstance(layer, Points) for layer in layers)
-        points = points[straighten(x[points], [curve[points] for curve in drawn], LONGEST[has_dots])]
-        chosen |= {id(layer): points for layer in layers}
+        lines = [layer for layer in layers if not isinstance(layer, Points)]
+        n_curves = len(_curves_of(lines, is_logarithmic=is_logarithmic))
+        n_bins = int(np.clip(n_points // (2 * len(groups) * n_curves), *BINS))
+        x, points = np.asarray(layers[0].x, float), np.zeros(0, int)
+        roughness = [_roughness(layer, is_logarithmic=is_logarithmic) > n_bins for layer in lines]
+        for is_rough in set(roughness):  # noise does not take the resonances of a smooth curve beside it
+            alike = [layer for layer, rough in zip(lines, roughness, strict=True) if rough == is_rough]
+            curves = _curves_of(alike, is_logarithmic=is_logarithmic)
+            sides = _sides_of(alike, is_logarithmic=is_logarithmic)
+            points = _points_of(x, curves, sides, n_bins, is_rough=is_rough)
+            chosen |= {id(layer): points for layer in alike}
+        dots = [layer for layer in layers if isinstance(layer, Points)]
+        if dots:
+            beside = thin(x, _curves_of(dots, is_logarithmic=is_logarithmic), min(n_bins, DOTS))
+            chosen |= {id(layer): np.union1d(points, beside) for layer in dots}
     return chosen
+
+
+def _points_of(
+    x: FloatArray, curves: Sequence[FloatArray], sides: Sequence[FloatArray], n_bins: int, *, is_rough: bool
+) -> IntArray:
+    """Choose the points of curves: smooth ones keep whole resonances, of noise the peaks and notches are left."""
+    drawn = [*curves, *sides]
+    if not is_rough:
+        points = straighten(x, drawn)
+        if len(points) <= n_bins:
+            return points
+    points = thin(x, curves, n_bins)
+    return points[straighten(x[points], [curve[points] for curve in drawn])]
+
+
+def _roughness(layer: Layer, *, is_logarithmic: bool) -> int:
+    """Count the points of a curve that the line between their neighbours does not show."""
+    counts = []
+    for curve in (curve for curve in _curves_of([layer], is_logarithmic=is_logarithmic) if np.isfinite(curve).any()):
+        off = np.abs(curve[1:-1] - (curve[:-2] + curve[2:]) / 2)
+        counts.append(int(np.count_nonzero(off > _row(curve) / 2)))
+    return max(counts, default=0)
 
 
 def _is_a_curve(layers: Sequence[Layer]) -> bool:

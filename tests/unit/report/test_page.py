@@ -56,6 +56,16 @@ def read(text):
     return reader
 
 
+def array_of(data, node):
+    """Numbers of the page: of single precision, or counts of 16 bits on an even spacing."""
+    packed = data["arrays"][node["$"]]
+    if isinstance(packed, str):
+        return np.frombuffer(base64.b64decode(packed), "<f4")
+    counts = np.frombuffer(base64.b64decode(packed["bytes"]), "<u2")
+    values = packed["low"] + packed["step"] * np.where(counts == 65535, np.nan, counts)
+    return np.exp(values) if packed.get("log") else values
+
+
 def data_of(text):
     return json.loads(re.search(r'id="page-data">(.*?)</script>', text, re.S)[1])
 
@@ -147,7 +157,7 @@ def test_plotly_knows_all_that_the_pictures_ask_for(page):
             return [plain(item) for item in node]
         if isinstance(node, dict):
             if "$" in node:
-                return np.frombuffer(base64.b64decode(data["arrays"][node["$"]]), "<f4")
+                return array_of(data, node)
             return {key: plain(item) for key, item in node.items()}
         return "#123456" if isinstance(node, str) and node.startswith("@") else node
 
@@ -244,7 +254,7 @@ def test_a_hundred_frfs_stay_light_and_keep_their_peaks(tmp_path):
     curves = [trace for trace in drawn if trace.get("showlegend", True)]
     assert len(curves) == 100
     for place, trace in enumerate(curves):
-        magnitude = np.frombuffer(base64.b64decode(data["arrays"][trace["y"]["$"]]), "<f4")
+        magnitude = array_of(data, trace["y"])
         exact = np.abs(recordings.frfs.values[:, place])
         np.testing.assert_allclose([magnitude.max(), magnitude.min()], [exact.max(), exact.min()], rtol=1e-6, atol=0)
 
@@ -297,7 +307,7 @@ def test_pulses_are_aligned_where_they_set_in(tmp_path):
     recordings = folder.results["ingest"]
     folder.results["ingest"] = replace(recordings, records=recordings.records.assign(trigger_s=0.02))
     data = data_of(page_of(folder, tmp_path))
-    time_ms = np.frombuffer(base64.b64decode(data["arrays"][data["pictures"]["records"]["data"][0]["x"]["$"]]), "<f4")
+    time_ms = array_of(data, data["pictures"]["records"]["data"][0]["x"])
     np.testing.assert_allclose(time_ms, 1e3 * (recordings.traces[0].time_s - 0.02), rtol=1e-6, atol=1e-5)  # in float32
 
 

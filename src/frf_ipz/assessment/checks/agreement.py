@@ -23,6 +23,7 @@ NORMAL_90 = 1.645  # standard deviations that hold 90 % of a normal distribution
 OVERSAMPLED = 4  # points of a transform between two that are independent: one of them is near its peak
 INSIDE = 0.75  # of the lines: of a 90 % band, a quarter outside is no chance
 MOSTLY_OUTSIDE = 0.25
+TOGETHER, ALL_FRFS = "better than before", "all measured FRFs"
 
 
 def amplitude(evidence: Evidence) -> Iterator[Check]:
@@ -195,7 +196,7 @@ def improvement(evidence: Evidence) -> Iterator[Check]:
     if not np.isfinite(after):
         return
     noise = float(np.median(20 * np.log10(1 + (evidence.noise / np.abs(evidence.measured))[evidence.is_heard])))
-    where, worst, point = "all measured FRFs", evidence.deviation, evidence.point_deviation
+    where, worst, point = ALL_FRFS, evidence.deviation, evidence.point_deviation
     says = (
         f"over all {evidence.frfs.n_frfs} measured FRFs ({evidence.band_text}, median) the model is off by "
         f"{before:.2g} dB before updating, {after:.2g} dB after"
@@ -207,7 +208,7 @@ def improvement(evidence: Evidence) -> Iterator[Check]:
         says += f"; at the point of interest, {point.where}, by {point.figures}"
     is_worse = _is_worse(before, after, noise)
     yield Check(
-        name="better than before",
+        name=TOGETHER,
         verdict=Verdict.WITH_CARE if is_worse else Verdict.USABLE,
         figure=after,
         limit=before,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.plotting.wording import counted, number
+from frf_ipz.plotting.wording import counted, number, percent
 from frf_ipz.report.section import Section, Table, run_figures
 from frf_ipz.runs.figures import median_coherence
 from frf_ipz.runs.picture_data import fitted_lines
@@ -70,7 +70,7 @@ def _table(frfs: FrfSet, lines: IntArray) -> Table:
                 label.unit,
                 averages,
                 median_coherence(coherence) or "–",
-                f"{number(100 * float(noise), 2)} %",
+                percent(float(noise), 2),
             ]
         )
     columns = ("output", "input", "quantity", "unit", "averages", "median coherence", "noise, of the RMS value")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.assessment.assessment import Verdict
+from frf_ipz.assessment.checks.agreement import ALL_FRFS, TOGETHER
 from frf_ipz.assessment.deviations import POINTS
 from frf_ipz.plotting.wording import counted, listed, number, percent, small_percent
 from frf_ipz.report.findings import card_texts, verdict_of
@@ -223,6 +224,9 @@ def _deviation_card(run: Results) -> Card:
     if deviation.at == POINTS:
         return Card("Error at the point of interest", figure, meaning)
     meaning += "; unknown gains are fitted" if run.frfs is not None and run.frfs.unknown_scale != "none" else ""
+    together = [check for check in run.assessment.checks if check.name == TOGETHER] if run.assessment else []
+    if together and together[0].where == ALL_FRFS:
+        meaning += f"; all together: {together[0].limit:.2g} → {together[0].figure:.2g} dB"
     meaning += "; nothing was measured at the points of interest" if run.points else ""
     return Card("Error at the measured points", figure, meaning)
 
