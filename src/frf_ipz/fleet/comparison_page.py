@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from frf_ipz.arrays import FloatArray
     from frf_ipz.fleet.mode_changes import ModeChange, RunComparison
     from frf_ipz.runs.results import Results
 
@@ -159,7 +160,7 @@ def _changes(comparison: RunComparison) -> Picture:
     )
 
 
-def _change_layers(modes: Sequence[ModeChange], changes: np.ndarray, bars: np.ndarray) -> tuple[Layer, ...]:
+def _change_layers(modes: Sequence[ModeChange], changes: FloatArray, bars: FloatArray) -> tuple[Layer, ...]:
     places = np.arange(1.0, len(modes) + 1)
     has_moved = np.array([mode.outcome is ModeOutcome.MOVED for mode in modes])
     layers: list[Layer] = []
@@ -180,9 +181,7 @@ def _change_layers(modes: Sequence[ModeChange], changes: np.ndarray, bars: np.nd
 
 def _frfs(before: Results, after: Results) -> list[Section]:
     """Lay the FRFs of both tests over each other, those that both have."""
-    if before.frfs is None or after.frfs is None:
-        return []
-    names = [[f"{label}, {label.quantity.value}" for label in run.frfs.labels] for run in (before, after) if run.frfs]
+    names = [[f"{label}, {label.quantity.value}" for label in run.labels] for run in (before, after)]
     common = [name for name in dict.fromkeys(names[0]) if name in names[1]]
     if not common:
         return []
@@ -201,15 +200,17 @@ def _frfs(before: Results, after: Results) -> list[Section]:
 
 
 def _overlay(before: Results, after: Results, columns: tuple[int, int], place: int) -> Picture:
-    curves = []
+    curves: list[tuple[Line, Line]] = []
     styles = (("before", before, Role.REFERENCE, 0.35, 5.0), ("after", after, Role.UPDATED, 1.0, 1.6))
     for (name, run, colour, opacity, width), column in zip(styles, columns, strict=True):
         frfs = run.frfs
+        if frfs is None:
+            continue
         lines = frfs.in_band(run.band_hz)
         x, values = frfs.frequency_hz[lines], np.asarray(frfs.values[lines, column])
         hover = magnitude_hover(frfs.labels[column])
         curves.append(magnitude_and_phase(name, colour, x, values, hover, opacity=opacity, width=width))
-    label = before.frfs.labels[columns[0]]
+    label = before.labels[columns[0]]
     magnitudes, phases = zip(*curves, strict=True)
     ends = np.array([before.band_hz, after.band_hz])
     return Picture(

@@ -7,7 +7,7 @@ both tests, nor by what differs from test to test with nothing changed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
@@ -225,7 +225,7 @@ class RunComparison(Concise):
         DataFrame
             One row a mode, with the fields of `ModeChange`.
         """
-        names = ModeChange.__slots__
+        names = [field.name for field in fields(ModeChange)]
         return pd.DataFrame([{name: getattr(mode, name) for name in names} for mode in self.modes], columns=names)
 
 
@@ -276,9 +276,9 @@ def compare_runs(
     """
     require_type("before", before, Results)
     require_type("after", after, Results)
-    for name, scatter in (("frequency_scatter", frequency_scatter), ("damping_scatter", damping_scatter)):
-        if isinstance(scatter, bool) or not isinstance(scatter, float | int) or not 0 <= scatter < np.inf:
-            raise InputError(f"{name} is {scatter!r}; it is a relative deviation, 0 or more")
+    for name, value in (("frequency_scatter", frequency_scatter), ("damping_scatter", damping_scatter)):
+        if isinstance(value, bool) or not isinstance(value, float | int) or not 0 <= value < np.inf:
+            raise InputError(f"{name} is {value!r}; it is a relative deviation, 0 or more")
     poles = _poles_of_both(before, after)
     scatter = frequency_scatter, damping_scatter
     comparison = RunComparison(
@@ -327,21 +327,29 @@ def _matched_places(poles: list[Roots]) -> list[tuple[int, int]]:
 
 def _mode_change(poles: list[Roots], places: tuple[int, int], scatter: tuple[float, float]) -> ModeChange:
     """Put a mode of both tests side by side; -1 is the place of one that a test does not have."""
-    values = {}
-    for name, roots, place in zip(("before", "after"), poles, places, strict=True):
-        if place >= 0:
-            values |= {
-                f"{name}_hz": float(roots.frequency_hz[place]),
-                f"{name}_hz_std": float(roots.frequency_std_hz[place]),
-                f"{name}_damping": float(roots.damping_ratio[place]),
-                f"{name}_damping_std": float(roots.damping_ratio_std[place]),
-            }
-    mode = ModeChange(**values, mac=_assurance(poles, places) if min(places) >= 0 else NONE)
+    before, after = (_root(roots, place) for roots, place in zip(poles, places, strict=True))
+    mode = ModeChange(
+        before_hz=before[0],
+        before_hz_std=before[1],
+        after_hz=after[0],
+        after_hz_std=after[1],
+        before_damping=before[2],
+        before_damping_std=before[3],
+        after_damping=after[2],
+        after_damping_std=after[3],
+        mac=_assurance(poles, places) if min(places) >= 0 else NONE,
+    )
     return replace(
         mode,
         frequency_sigma=_sigma(mode.change, mode.change_std, scatter[0]),
         damping_sigma=_sigma(mode.damping_change, mode.damping_change_std, scatter[1]),
     )
+
+
+def _root(roots: Roots, place: int) -> tuple[float, ...]:
+    """Frequency and damping ratio, each with its standard deviation; NaN where there is no such mode."""
+    columns = (roots.frequency_hz, roots.frequency_std_hz, roots.damping_ratio, roots.damping_ratio_std)
+    return tuple(float(column[place]) if place >= 0 else NONE for column in columns)
 
 
 def _sigma(change: float, std: float, scatter: float) -> float:

@@ -85,7 +85,11 @@ def draw_picture(picture: Picture, *, n_alike: int = 1) -> dict[str, Any]:
     counts: list[tuple[int, int]] = []
     for index, panel in enumerate(picture.panels):
         chosen = _thinned_points(panel, POINTS // n_alike)
-        counts += [(len(chosen[id(layer)]), len(layer.x)) for layer in panel.layers if id(layer) in chosen]
+        counts += [
+            (len(chosen[id(layer)]), len(layer.x))
+            for layer in panel.layers
+            if isinstance(layer, Line | Points | Band) and id(layer) in chosen
+        ]
         is_beside = panel.x is not None
         drawn = [(layer, _number("y", 0 if is_beside else index)) for layer in panel.layers]
         if panel.backdrop is not None:
@@ -94,8 +98,8 @@ def draw_picture(picture: Picture, *, n_alike: int = 1) -> dict[str, Any]:
             for trace in _draw(_thinned(layer, chosen.get(id(layer))), panel):
                 axes = {"xaxis": _number("x", index if is_beside else 0), "yaxis": y}
                 traces.append(_with_common(trace, layer, named, axes))
-    drawn = _count_of_points(counts, "lines" if picture.is_over_frequency else "points")
-    return {"data": traces, "layout": _layout(picture, has_legend=bool(named)), **drawn}
+    said = _count_of_points(counts, "lines" if picture.is_over_frequency else "points")
+    return {"data": traces, "layout": _layout(picture, has_legend=bool(named)), **said}
 
 
 def _count_of_points(counts: Sequence[tuple[int, int]], noun: str) -> dict[str, str]:
