@@ -41,7 +41,14 @@ NONE = float("nan")
 
 
 class ModeOutcome(StrEnum):
-    """What became of a mode."""
+    """What became of a mode.
+
+    Examples
+    --------
+    >>> import frf_ipz
+    >>> frf_ipz.ModeOutcome("only after") is frf_ipz.ModeOutcome.NEW
+    True
+    """
 
     MOVED = "moved"
     DAMPING = "damping only"
