@@ -96,7 +96,9 @@ def find_inverted_columns(frfs: FrfSet, situation: Situation) -> LikelyCause | N
     for response in dict.fromkeys(label.output_channel for label in frfs.labels if label.input_channel):
         force = next(label.input_channel for label in frfs.labels if label.output_channel == response)
         try:
-            fit = fit_modes(_taken_back(frfs, response), options=FitOptions(band_hz=situation.measured.band_hz, delay=False))
+            fit = fit_modes(
+                _taken_back(frfs, response), options=FitOptions(band_hz=situation.measured.band_hz, delay=False)
+            )
         except FrfIpzError:
             continue
         taken_back = replace(situation, measured=measured_modes(fit))
