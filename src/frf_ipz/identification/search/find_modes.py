@@ -31,8 +31,13 @@ from frf_ipz.identification.search.delays import CommonDelay, common_delay, each
 from frf_ipz.identification.search.discrepancy import with_discrepancy
 from frf_ipz.identification.search.drift import Drift
 from frf_ipz.identification.search.force_error import ForceError
-from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, assess_fit, peak_levels
-from frf_ipz.identification.search.selection import ROUGH_ITERATIONS, SelectedModes, select_modes
+from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, peak_levels
+from frf_ipz.identification.search.selection import (
+    ROUGH_ITERATIONS,
+    SelectedModes,
+    drop_insignificant,
+    select_modes,
+)
 from frf_ipz.identification.search.spurious_poles import half_widths_apart
 from frf_ipz.identification.stabilization import find_start_poles
 from frf_ipz.late_imports import import_late
@@ -235,7 +240,7 @@ def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progres
             else:
                 selected = other
         progress(0.5, "refining")
-        return _refine_with_final_weights(lines, selected, chosen, start=start.table, delay_s=delay_s)
+        return _refine_with_final_weights(lines, selected, chosen, options, start=start.table, delay_s=delay_s)
 
     def find_poles(lines: MeasuredLines) -> ComplexArray:
         complex_modes = replace(options, modes="complex")
@@ -323,7 +328,7 @@ def _against_model_error(fitted: FittedModes, options: FitOptions) -> FittedMode
     selected = _select(lines, fitted.fit.poles, fitted.terms, options, noise_is_known=False)
     lines = replace(lines, known=np.ones_like(lines.known))  # the model error is part of it: not to be estimated again
     refitted = _refine_with_final_weights(
-        lines, selected, fitted.terms, start=fitted.start, delay_s=fitted.delay_s, model_limits=True
+        lines, selected, fitted.terms, options, start=fitted.start, delay_s=fitted.delay_s, model_limits=True
     )
     squares = np.abs(refitted.lines.receptance - response(refitted.fit.system, refitted.terms, refitted.lines.s)) ** 2
     degrees_of_freedom = len(squares) - refitted.fit.system.n_linear / 2
@@ -352,32 +357,44 @@ def _select(
 ) -> SelectedModes:
     data = replace(lines.weighted(shared=True), real_modes=options.modes == "real")
     selected = select_modes(data, poles, terms, options, noise_is_known=noise_is_known)
-    if not mode_order(selected.fit.poles, (2 * np.pi * lines.band_hz[0], 2 * np.pi * lines.band_hz[1]))[1]:
+    _require_modes(lines, selected.fit.poles)
+    return selected
+
+
+def _require_modes(lines: MeasuredLines, poles: ComplexArray) -> None:
+    if not mode_order(poles, (2 * np.pi * lines.band_hz[0], 2 * np.pi * lines.band_hz[1]))[1]:
         raise NoModesError(
             f"no mode stands out of the noise between {lines.band_hz[0]:g} and {lines.band_hz[1]:g} Hz; "
             "look at the FRFs and their coherence, set another [fit] band_hz, or pin a mode with pin_hz"
         )
-    return selected
 
 
 def _refine_with_final_weights(
     lines: MeasuredLines,
     selected: SelectedModes,
     terms: SmoothTerms,
+    options: FitOptions,
     *,
     start: pd.DataFrame,
     delay_s: FloatArray,
     model_limits: bool = False,
 ) -> FittedModes:
     """Fit once more with the best weights, and find out whether noise or model limits the fit."""
-    fit, data, goodness = selected.fit, selected.data, selected.goodness
+    fit, data, goodness, decisions = selected.fit, selected.data, selected.goodness, selected.decisions
     lines = replace(lines, receptance=data.receptance)
     if not lines.known.all():
         lines = with_misfit_noise(lines, goodness.misfit / data.weight)
     final = replace(lines.weighted(), real_modes=data.real_modes)
     if not (lines.known.all() and final.is_shared and fit.has_converged):  # otherwise the search has done it
         fit = refine_poles(final, fit.poles, terms)
-        goodness = assess_fit(final, fit, terms)
+        noise_is_known = bool(lines.known.all())
+        while True:  # what the search believed by its own weights
+            rest, goodness, dropped = drop_insignificant(final, fit, terms, options, noise_is_known=noise_is_known)
+            if not dropped:
+                break
+            decisions += dropped
+            fit = refine_poles(final, rest.poles, terms)
+        _require_modes(lines, fit.poles)
     misfit_ratio, noise, noise_from = misfit_over_noise(goodness, fit), lines.variance, "recordings"
     if model_limits or not lines.known.all() or np.median(misfit_ratio) > MODEL_ERROR:
         noise_from = "misfit"
@@ -396,7 +413,7 @@ def _refine_with_final_weights(
         drift=selected.drift,
         force_error=selected.force_error,
         start=start,
-        decisions=selected.decisions,
+        decisions=decisions,
         delay_s=delay_s,
     )
 

@@ -112,9 +112,7 @@ def select_modes(
     SelectedModes
         The fit.
     """
-    rejected = tuple((pole.hz, pole.why) for pole in options.strike)
-    pinned = tuple((pole.hz, pole.why) for pole in options.pinned)
-    search = _Search(data=data, terms=terms, pinned=pinned, rejected=rejected, noise_is_known=noise_is_known)
+    search = _search(data, terms, options, noise_is_known=noise_is_known)
     poles = _with_pinned(search, _without_rejected(search, poles))
     # start poles are not many, and neither errors of strong modes nor tails of weak ones show yet
     start = refine_poles(data, poles, terms, iterations=ROUGH_ITERATIONS)
@@ -127,6 +125,44 @@ def select_modes(
         goodness=goodness,
         decisions=tuple(search.decisions),
     )
+
+
+def drop_insignificant(
+    data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms, options: FitOptions, *, noise_is_known: bool
+) -> tuple[RefinedPoles, GoodnessOfFit, tuple[dict[str, object], ...]]:
+    """Drop the poles that the lines do not ask for, as they are weighed now.
+
+    Parameters
+    ----------
+    data : WeightedLines
+        Lines and weights.
+    fit : RefinedPoles
+        A fit to them.
+    terms : SmoothTerms
+        Terms for modes out of band.
+    options : FitOptions
+        Poles that are pinned and rejected.
+    noise_is_known : bool
+        All FRFs came with their variance.
+
+    Returns
+    -------
+    fit : RefinedPoles
+        The same where nothing was dropped, else roughly refined.
+    goodness : GoodnessOfFit
+        Of that fit.
+    decisions : tuple of dict
+        Poles that were dropped, with the reason.
+    """
+    search = _search(data, terms, options, noise_is_known=noise_is_known)
+    fit, goodness = _drop_insignificant(search, fit, spurious_too=False)
+    return fit, goodness, tuple(search.decisions)
+
+
+def _search(data: WeightedLines, terms: SmoothTerms, options: FitOptions, *, noise_is_known: bool) -> _Search:
+    rejected = tuple((pole.hz, pole.why) for pole in options.strike)
+    pinned = tuple((pole.hz, pole.why) for pole in options.pinned)
+    return _Search(data=data, terms=terms, pinned=pinned, rejected=rejected, noise_is_known=noise_is_known)
 
 
 def _add_and_drop(search: _Search, start: RefinedPoles) -> tuple[RefinedPoles, GoodnessOfFit]:
