@@ -2,7 +2,8 @@
 From arrays in memory to a controller-ready model
 =================================================
 
-FRFs and matrices that are in Python already need no file. A machine of three masses, a measurement at two of them.
+FRFs and matrices that are in Python already need no file, and the state space comes back without one. A machine of
+three masses, a measurement at two of them.
 """
 
 import matplotlib.pyplot as plt
@@ -43,12 +44,22 @@ results = frf_ipz.Campaign(frfs, model, points=["2:+x"], diagnose=tolerances).ru
 print(results.summary())
 
 # %%
+# The state space, in memory too: a python-control system with the names of the DOFs.
+system = results.state_space
+print(system.nstates, "states; inputs", system.input_labels, "outputs", system.output_labels)
+
+# %%
+# Its response at the tool is the prediction, which has a band of 90 %.
 prediction = results.prediction
+tool = system[system.output_labels.index("2:+x"), 0]
+response = tool.frequency_response(2 * np.pi * prediction.frequency_hz).complex
 true = frf_ipz.compute_frfs(machine, prediction.labels, 2j * np.pi * prediction.frequency_hz)
 figure, axes = plt.subplots(layout="constrained")
 axes.semilogy(prediction.frequency_hz, abs(true), color="0.7", linewidth=4, label="machine")
 axes.semilogy(prediction.frequency_hz, abs(prediction.nominal), "--", label="model")
-axes.semilogy(prediction.frequency_hz, abs(prediction.values), label="updated model")
+axes.semilogy(prediction.frequency_hz, abs(response), label="state space of the updated model")
+band = prediction.magnitude_low[:, 0], prediction.magnitude_high[:, 0]
+axes.fill_between(prediction.frequency_hz, *band, color="C1", alpha=0.3, label="90 % band")
 axes.set(xlabel="Frequency, Hz", ylabel="Accelerance, m/s²/N", title=str(prediction.labels[0]))
 axes.legend()
 plt.show()

@@ -36,6 +36,11 @@ FACTORED_ORDER = 20_000  # beyond, a factor of the stiffness takes long enough t
 STEPS = (50, 100, 200)  # of Lanczos' method, in turn; the last costs a tenth of a factor of a solid
 RARE = 1e-12  # chance that a random start hides a smaller eigenvalue
 ESTIMATE_TOLERANCE = 1e-2  # of the largest eigenvalue, which is only a yardstick
+GYROSCOPIC = (
+    "a skew-symmetric part is that of gyroscopic (Coriolis) forces, of what rotates, or of circulatory ones, of "
+    "journal bearings and followers; the method needs symmetric matrices: measure the structure at rest, and hand in "
+    "(B + B^T) / 2"
+)
 
 
 def symmetrise(matrix: Matrix, *, rows: IntArray | None = None) -> Matrix:
@@ -77,18 +82,13 @@ def symmetrise(matrix: Matrix, *, rows: IntArray | None = None) -> Matrix:
 
 
 def _advice_on_asymmetry(matrix: Matrix) -> str:
-    """Name what makes a matrix unsymmetric."""
-    skew = abs(matrix - matrix.T).sum() / 2
-    even = abs(sparse.triu(matrix + matrix.T, 1)).sum()
-    if even <= SYMMETRY_TOLERANCE * skew:
-        return (
-            "its entries beside the diagonal have opposite signs in the two triangles, as gyroscopic (Coriolis) "
-            "matrices of what rotates have; mass, stiffness and damping matrices are symmetric: leave that part out"
-        )
-    return (
-        "export it with both triangles, or with one of them only and 'symmetric' in its first line; gyroscopic and "
-        "circulatory forces, which are not symmetric, have to be left out"
-    )
+    """Name what makes a matrix unsymmetric, and what to hand in instead."""
+    is_half = not (sparse.triu(matrix, 1).count_nonzero() and sparse.tril(matrix, -1).count_nonzero())
+    if is_half:
+        return "export it with both triangles, or with one of them only and 'symmetric' in its first line"
+    skew, even = abs(matrix - matrix.T).sum(), abs(sparse.triu(matrix + matrix.T, 1)).sum()
+    kind = "entries beside the diagonal have opposite signs in the two triangles" if even < skew else "triangles differ"
+    return f"its {kind}: {GYROSCOPIC}"
 
 
 def massless_rows(mass: Matrix) -> BoolArray:

@@ -227,11 +227,19 @@ def _receptances(
 
 
 def _due_spread(measured: Measured, expansion: ShapeExpansion, labels: Sequence[FrfLabel]) -> FloatArray:
-    """Share of the ensemble's spread that is due in each FRF: the larger of those at its two ends."""
+    """Factor on the ensemble's spread that is due in each FRF: the larger of those at its two ends.
+
+    What the other side of the test measured is known as well as reciprocity holds, of which measured points tell that
+    are on both sides: sensors see more than the motion that excites them.
+    """
     outputs = {label.output_dof.unsigned for label in measured.connections}
     inputs = {label.input_dof.unsigned for label in measured.connections}
 
-    def at(dof: AnyDof, known: set[AnyDof]) -> float:
-        return expansion.inner_spread if dof.unsigned in known else expansion.spread_at(dof)
+    def at(dof: AnyDof, known: set[AnyDof], opposite: set[AnyDof]) -> float:
+        if dof.unsigned in known:
+            return expansion.inner_spread
+        return expansion.reciprocal_spread if dof.unsigned in opposite else expansion.spread_at(dof)
 
-    return np.array([max(at(label.output_dof, outputs), at(label.input_dof, inputs)) for label in labels], float)
+    dues = [(at(label.output_dof, outputs, inputs), at(label.input_dof, inputs, outputs)) for label in labels]
+    due: FloatArray = np.array(dues, float).reshape(-1, 2).max(axis=1)
+    return due

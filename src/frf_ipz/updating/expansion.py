@@ -73,6 +73,9 @@ class ShapeExpansion:
         Nodes between the measured points; all others lie beyond them.
     inner_spread : float
         Spread of the ensemble that is due there, over the whole of it, which is due beyond.
+    reciprocal_spread : float
+        The same at a sensor where the test only excites, or the other way round: the model's shapes are known there as
+        well as reciprocity holds.
 
     Examples
     --------
@@ -96,6 +99,7 @@ class ShapeExpansion:
     is_level_known: bool
     inner_nodes: tuple[int, ...] = ()
     inner_spread: float = 1.0
+    reciprocal_spread: float = 1.0
 
     def spread_at(self, dof: AnyDof) -> float:
         """Tell how much of the ensemble's spread is due at a point.

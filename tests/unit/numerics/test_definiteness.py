@@ -1,6 +1,8 @@
 """Whether large matrices are those of a structure, from few products and from one factor."""
 
+import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy import sparse
 
 from brick_plate import plate_matrices
@@ -67,3 +69,23 @@ def test_a_very_large_stiffness_is_judged_by_the_factors_of_its_modes(plate, mon
     model = model_of(sparse.csr_array(bad), mass, corners)
     with pytest.raises(IllConditionedError, match="stiffness matrix of the model 'model' is indefinite"):
         solve_basis(model, n_modes=4)
+
+
+MASS, STIFFNESS, DOFS = np.eye(2), np.array([[3e5, -1e5], [-1e5, 2e5]]), ["1:x", "1:y"]
+
+
+@pytest.mark.parametrize("gyroscopic", [40.0, 0.5])  # more and less than what is symmetric
+def test_the_advice_on_a_gyroscopic_matrix_works(gyroscopic):
+    damping = 1e-5 * STIFFNESS + gyroscopic * np.array([[0.0, -1.0], [1.0, 0.0]])
+    with pytest.raises(InputError, match="gyroscopic") as refusal:
+        StructuralModel.from_matrices(MASS, STIFFNESS, dofs=DOFS, damping=damping)
+    formula = str(refusal.value).rsplit("hand in ", 1)[1]
+    advised = eval(formula.replace("^", "."), {"B": damping})  # the words are the program's own
+    model = StructuralModel.from_matrices(MASS, STIFFNESS, dofs=DOFS, damping=advised)
+    assert_allclose(model.damping.toarray(), 1e-5 * STIFFNESS, rtol=1e-12)
+
+
+def test_half_a_matrix_is_not_taken_for_gyroscopic():
+    with pytest.raises(InputError, match="both triangles") as refusal:
+        StructuralModel.from_matrices(MASS, np.triu(STIFFNESS), dofs=DOFS)
+    assert "gyroscopic" not in str(refusal.value)

@@ -23,6 +23,7 @@ from frf_ipz.updating.shape_expansion.between_points import inner_points
 from frf_ipz.updating.shape_expansion.expanded_model import ExpandedModes, build_expanded_model, expand_modes
 from frf_ipz.updating.shape_expansion.left_out_points import (
     FEWEST,
+    LeftOutPoints,
     errors_at_points,
     leave_points_out,
     side_with_more,
@@ -105,6 +106,7 @@ def with_expanded_shapes(
         is_level_known=fit.unknown_scale == "none",
         inner_nodes=inner_nodes,
         inner_spread=inner_spread,
+        reciprocal_spread=_reciprocal_spread(left_out),
     )
     return replace(
         updated,
@@ -116,6 +118,12 @@ def with_expanded_shapes(
         scale=fit_scale(fit, _pairs_of_measured_modes(fit), model, fit.model.poles[: fit.n_modes], ensemble),
         expansion=expansion,
     )
+
+
+def _reciprocal_spread(left_out: LeftOutPoints) -> float:
+    """Tell by how much errors exceed what is stated where the other side has the point, over those at any other."""
+    seen = left_out.reciprocal[np.isfinite(left_out.reciprocal)]
+    return float(seen.max() / left_out.calibration.max()) if seen.size else 1.0
 
 
 def _split_modes(modes: ExpandedModes) -> tuple[tuple[float, ...], ...]:

@@ -39,12 +39,15 @@ class LeftOutPoints:
         Logarithm of measured over predicted amplitude, the median over the modes.
     calibration : (n_points,) array
         Errors of the shape there over their stated standard deviations, so that these hold 90 % of its modes.
+    reciprocal : (n_points,) array
+        The same where the other side of the test, which has the point too, is kept; NaN where it does not have it.
     """
 
     points: tuple[AnyDof, ...]
     error_db: FloatArray
     log_ratio: FloatArray
     calibration: FloatArray
+    reciprocal: FloatArray
 
 
 def side_with_more(fit: ModalFit) -> tuple[AnyDof, ...]:
@@ -90,16 +93,21 @@ def leave_points_out(fit: ModalFit, model: ReducedModel, *, error: float) -> Lef
     chosen = [points[place] for place in np.unique(np.linspace(0, len(points) - 1, MOST).round().astype(int))]
     s = _lines(fit)
     measured = fit.model(s)
-    judged = {point: _judge(fit, model, point, error, s, measured) for point in chosen}
+    judged = {point: _judge(fit, model, point, _without(fit, point), error, s, measured) for point in chosen}
     known = {point: judgement for point, judgement in judged.items() if judgement is not None}
     if not known:
         return None
-    squares = [np.quantile(judgement.squares, COVERED) / COVERED_SQUARE for judgement in known.values()]
+    beside = {
+        point: _judge(fit, model, point, _without(fit, point, other_side=False), error, s, measured)
+        for point in known
+        if _is_on_both_sides(fit, point)
+    }
     return LeftOutPoints(
         points=tuple(known),
         error_db=np.array([judgement.error_db for judgement in known.values()]),
         log_ratio=np.array([judgement.log_ratio for judgement in known.values()]),
-        calibration=np.sqrt(squares),
+        calibration=np.array([judgement.calibration for judgement in known.values()]),
+        reciprocal=np.array([np.nan if (kept := beside.get(point)) is None else kept.calibration for point in known]),
     )
 
 
@@ -164,17 +172,24 @@ class _Judgement:
     log_ratio: float
     squares: FloatArray
 
+    @property
+    def calibration(self) -> float:
+        """Factor on standard deviations with which they hold most modes."""
+        return float(np.sqrt(np.quantile(self.squares, COVERED) / COVERED_SQUARE))
+
 
 def _judge(
-    fit: ModalFit, model: ReducedModel, point: AnyDof, error: float, s: ComplexArray, measured: ComplexArray
+    fit: ModalFit,
+    model: ReducedModel,
+    point: AnyDof,
+    kept: BoolArray,
+    error: float,
+    s: ComplexArray,
+    measured: ComplexArray,
 ) -> _Judgement | None:
-    """Predict a point from the others; None where they do not tell it."""
-    is_output = any(label.output_dof == point for label in fit.labels)
-    ends = [
-        (label.output_dof, label.input_dof) if is_output else (label.input_dof, label.output_dof)
-        for label in fit.labels
-    ]
-    others = measured_shapes(fit, kept=_kept(ends, point))
+    """Predict a point from the FRFs that are kept; None where they do not tell it."""
+    is_output, ends = _ends(fit, point)
+    others = measured_shapes(fit, kept=kept)
     if others is None:
         return None
     is_known = fit.unknown_scale == "none"
@@ -206,8 +221,20 @@ def _judge(
     )
 
 
-def _kept(ends: list[tuple[AnyDof, AnyDof]], point: AnyDof) -> BoolArray:
+def _ends(fit: ModalFit, point: AnyDof) -> tuple[bool, list[tuple[AnyDof, AnyDof]]]:
+    """Tell whether a point is a sensor, and give the ends of all FRFs, that of its side first."""
+    is_output = any(label.output_dof == point for label in fit.labels)
+    pairs = [(label.output_dof, label.input_dof) for label in fit.labels]
+    return is_output, pairs if is_output else [(force, output) for output, force in pairs]
+
+
+def _without(fit: ModalFit, point: AnyDof, *, other_side: bool = True) -> BoolArray:
     """FRFs without a point; what it does on the other side is left out too where others are there."""
+    ends = _ends(fit, point)[1]
     there = np.array([end != point for end, _ in ends], bool)
     nowhere = there & np.array([partner.unsigned != point.unsigned for _, partner in ends], bool)
-    return nowhere if nowhere.any() else there
+    return nowhere if other_side and nowhere.any() else there
+
+
+def _is_on_both_sides(fit: ModalFit, point: AnyDof) -> bool:
+    return any(partner.unsigned == point.unsigned for _, partner in _ends(fit, point)[1])

@@ -19,7 +19,9 @@ def beam():
 
 def left_out(calibration):
     zeros = np.zeros(len(SENSORS))
-    return LeftOutPoints(points=SENSORS, error_db=zeros, log_ratio=zeros, calibration=np.array(calibration))
+    return LeftOutPoints(
+        points=SENSORS, error_db=zeros, log_ratio=zeros, calibration=np.array(calibration), reciprocal=zeros * np.nan
+    )
 
 
 def test_a_corner_of_a_plate_lies_beyond_and_its_middle_between():

@@ -9,6 +9,7 @@ from scipy import sparse
 import frf_ipz
 from frf_ipz.export.state_space import make_state_space
 from frf_ipz.updating.shape_expansion.expanded_model import expand_modes
+from frf_ipz.updating.shape_expansion.left_out_points import leave_points_out
 from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes
 from frf_testbench.updating.synthetic_fit import TrueModes, simulate_fit
 
@@ -97,6 +98,34 @@ def test_bands_are_as_wide_as_what_is_due_between_and_beyond_measured_points(lef
 
     assert np.median(widths(29, 0.5) / widths(29, 1.0)) < 0.9
     np.testing.assert_allclose(widths(33, 0.5), widths(33, 1.0))
+
+
+def test_the_band_where_the_test_only_excites_is_as_wide_as_reciprocity_holds(left_out, expanded):
+    fit, *_ = left_out
+    lines = 2j * np.pi * np.linspace(*BAND_HZ, 50)
+    only_sensed = frf_ipz.FrfLabel(SENSORS[0], SENSORS[1], frf_ipz.FrfQuantity.RECEPTANCE)
+
+    def widths(label, spread):
+        expansion = replace(expanded.expansion, inner_spread=0.5, reciprocal_spread=spread)
+        low, high = frf_ipz.band_of_magnitudes(fit, replace(expanded, expansion=expansion), labels=[label], s=lines)
+        return np.log(high / low)
+
+    assert np.median(widths(only_sensed, 3.0) / widths(only_sensed, 0.5)) > 1.1
+    np.testing.assert_allclose(widths(fit.labels[0], 3.0), widths(fit.labels[0], 0.5))
+
+
+def test_sensors_that_see_more_than_what_excites_them_are_told_by_points_on_both_sides(left_out):
+    fit, reduced_model, *_ = left_out
+    numbers = [SENSORS.index(label.output_dof) for label in fit.labels]
+    seen_besides = 1 + 0.3 * np.random.default_rng(1).normal(size=(fit.n_modes, len(SENSORS)))[:, numbers]
+    residues = fit.model.residues.copy()
+    residues[: fit.n_modes] *= seen_besides
+    besides = replace(fit, model=replace(fit.model, residues=residues))
+    holds, fails = (leave_points_out(each, reduced_model, error=0.03) for each in (fit, besides))
+    on_both = [point in ACTUATORS for point in holds.points]
+    np.testing.assert_array_equal(np.isfinite(holds.reciprocal), on_both)
+    assert np.nanmax(fails.reciprocal) > 2 * np.nanmax(holds.reciprocal)
+    assert np.nanmax(fails.reciprocal) > fails.calibration.max()
 
 
 def test_the_update_alone_is_far_off(left_out):

@@ -92,7 +92,7 @@ def read_matrix_market(request: MatrixRequest) -> StoredMatrix:
     text = _split(request.path, _read_plain_bytes(request.path))
     _require_square(text, request)
     rows, columns, values = _parse_entries(text)
-    return _assemble(text, rows, columns, _values(text, values, request.what))
+    return _assemble(text, request.what, rows, columns, _values(text, values, request.what))
 
 
 FORMAT = MatrixFormat(rank=9, fits=lambda path, head: True, read=read_matrix_market)  # noqa: ARG005 - its message says what is known
@@ -304,7 +304,9 @@ def _values(text: _Text, values: ComplexArray | FloatArray, what: str) -> Comple
     return values
 
 
-def _assemble(text: _Text, rows: IntArray, columns: IntArray, values: ComplexArray | FloatArray) -> StoredMatrix:
+def _assemble(
+    text: _Text, what: str, rows: IntArray, columns: IntArray, values: ComplexArray | FloatArray
+) -> StoredMatrix:
     order = text.size[0]
     entries: Any = sparse.coo_array((values, (rows, columns)), shape=(order, order))
     matrix: Matrix = sparse.csr_array(entries)
@@ -316,8 +318,8 @@ def _assemble(text: _Text, rows: IntArray, columns: IntArray, values: ComplexArr
     if text.symmetry == "skew-symmetric" and matrix.nnz:
         raise FileFormatError(
             text.path,
-            "is skew-symmetric, as gyroscopic (Coriolis) matrices of what rotates are; mass, stiffness and damping "
-            "matrices are symmetric: leave it out",
+            "is skew-symmetric, as gyroscopic (Coriolis) matrices of what rotates are; the method needs symmetric "
+            f"matrices: measure the structure at rest, and leave the {what} file out",
         )
     upper, lower = sparse.csr_array(sparse.triu(matrix, 1)), sparse.csr_array(sparse.tril(matrix, -1).T)
     has_both = bool(upper.nnz and lower.nnz)
