@@ -6,17 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz import __version__
 from frf_ipz.fleet.mode_changes import ModeOutcome
-from frf_ipz.output_files import write_text
-from frf_ipz.plotting.curves import magnitude_title
+from frf_ipz.fleet.page import write_sections
+from frf_ipz.plotting.curves import Q95, magnitude_title
 from frf_ipz.plotting.frfs import PHASE_AXIS, magnitude_and_phase, magnitude_hover
 from frf_ipz.plotting.picture import Axis, Layer, Line, Panel, Picture, Points, Role, frequency_axis
 from frf_ipz.plotting.wording import NOTHING, counted, number, with_error
-from frf_ipz.report.html import PLOTLY, REPORT, SCRIPTS, packed_asset, page_environment, read_asset
-from frf_ipz.report.page import margin_style
-from frf_ipz.report.page_data import Packer, packed_pictures
-from frf_ipz.report.policy import page_policy
 from frf_ipz.report.section import Block, Card, Cards, Choice, Figure, Headline, Section, Table
 
 if TYPE_CHECKING:
@@ -38,7 +33,6 @@ COLUMNS = (
     "MAC",
     "outcome",
 )
-Q95 = 1.96  # standard deviations of a 95 % interval
 
 
 def write_comparison(comparison: RunComparison, before: Results, after: Results, path: Path) -> None:
@@ -59,34 +53,16 @@ def write_comparison(comparison: RunComparison, before: Results, after: Results,
         If it cannot be written.
     """
     sections = [_overview(comparison), *_frfs(before, after), _provenance(before, after)]
-    packer = Packer()
     title = f"{before.name} and {after.name}" if before.name != after.name else f"{before.name}, before and after"
     bands = np.array([before.band_hz, after.band_hz])
-    scale = frequency_axis(float(bands[:, 0].min()), float(bands[:, 1].max())).scale
-    text = (
-        page_environment()
-        .get_template("report/report.html")
-        .render(
-            title=title,
-            version=__version__,
-            particulars=[],
-            chooser=None,
-            sections=sections,
-            page_data={
-                "pictures": packed_pictures(sections, packer),
-                "hiddenFrfs": [],
-                "frequencyScale": scale,
-                "lowestHz": float(min(1.0, *bands[bands > 0])),
-                "arrays": packer.arrays,
-            },
-            style=read_asset(REPORT, "page.css"),
-            margins=margin_style(title, f"frf_ipz {__version__}", str(after.manifest.get("when", ""))[:10]),
-            library=packed_asset(REPORT, PLOTLY),
-            scripts=[read_asset(REPORT, "page.js")],
-            policy=page_policy(*[read_asset(REPORT, script) for script in SCRIPTS]),
-        )
+    write_sections(
+        path,
+        title,
+        sections,
+        frequency_scale=frequency_axis(float(bands[:, 0].min()), float(bands[:, 1].max())).scale,
+        lowest_hz=float(min(1.0, *bands[bands > 0])),
+        date=str(after.manifest.get("when", ""))[:10],
     )
-    write_text(path, text)
 
 
 def _overview(comparison: RunComparison) -> Section:

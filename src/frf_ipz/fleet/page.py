@@ -22,6 +22,7 @@ from frf_ipz.report.policy import page_policy
 from frf_ipz.report.section import MOST_ROWS, Card, Cards, Choice, Figure, Form, Headline, Section, Table
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from frf_ipz.fleet.analysis import FleetAnalysis, FleetRoots
@@ -48,11 +49,44 @@ def write_page(name: str, analysis: FleetAnalysis, out: Path) -> None:
     OSError
         If it cannot be written.
     """
-    sections = [section for section in _sections(analysis, out) if section is not None]
+    write_sections(out / PAGE, name, [section for section in _sections(analysis, out) if section is not None])
+
+
+def write_sections(
+    path: Path,
+    title: str,
+    sections: Sequence[Section],
+    *,
+    frequency_scale: str = "linear",
+    lowest_hz: float = 1.0,
+    date: str = "",
+) -> None:
+    """Write a page of sections that is about more than one run.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    title : str
+        Of the page.
+    sections : sequence of Section
+        What is on it.
+    frequency_scale : str
+        ``linear`` or ``log``, of frequency axes.
+    lowest_hz : float
+        At which they may begin.
+    date : str
+        That the margins of printed pages show.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
     packer = Packer()
     template = page_environment(TEMPLATES).get_template("report/report.html")
     text = template.render(
-        title=name,
+        title=title,
         version=__version__,
         particulars=[],
         chooser=None,
@@ -60,17 +94,17 @@ def write_page(name: str, analysis: FleetAnalysis, out: Path) -> None:
         page_data={
             "pictures": packed_pictures(sections, packer),
             "hiddenFrfs": [],
-            "frequencyScale": "linear",
-            "lowestHz": 1.0,
+            "frequencyScale": frequency_scale,
+            "lowestHz": lowest_hz,
             "arrays": packer.arrays,
         },
         style=read_asset(REPORT, "page.css"),
-        margins=margin_style(name, f"frf_ipz {__version__}", ""),
+        margins=margin_style(title, f"frf_ipz {__version__}", date),
         library=packed_asset(REPORT, PLOTLY),
         scripts=[read_asset(REPORT, "page.js")],
         policy=page_policy(*[read_asset(REPORT, script) for script in SCRIPTS]),
     )
-    write_text(out / PAGE, text)
+    write_text(path, text)
 
 
 def _sections(analysis: FleetAnalysis, out: Path) -> list[Section | None]:
