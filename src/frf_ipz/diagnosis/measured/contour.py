@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 
 WINDOW_DECAYS = 8.0  # sigma times a record: 3e-4 of a mode remains at its end
 SLOPE = 0.6  # of sigma over the distance to the next resonance
@@ -81,30 +81,32 @@ def find_resonances(
         Peaks that are at least twice as high as the valleys beside them.
     """
     inner = np.flatnonzero((level[1:-1] > level[:-2]) & (level[1:-1] >= level[2:])) + 1
-    peaks, decays = [], []
-    for peak in inner.tolist():
-        sides = np.array([_half_power_frequency(omega_rad_s, level, peak, step) for step in (-1, 1)])
-        sides = sides[~np.isnan(sides)] if at_ends else sides
-        if not np.isfinite(sides).all() or not len(sides):
-            continue
-        width = float(np.mean(np.abs(sides - omega_rad_s[peak])))
-        peaks.append(omega_rad_s[peak])
-        decays.append(max(width - decay_1_s, 0.02 * width))
-    return Resonances(omega_rad_s=np.array(peaks), decay_1_s=np.array(decays))
+    sides = np.stack([_half_power_frequencies(omega_rad_s, level, inner, step) for step in (-1, 1)], 1)
+    is_known = np.isfinite(sides)
+    is_peak = is_known.all(1)
+    if at_ends:
+        is_peak = is_known.any(1) & ~np.isinf(sides).any(1)
+    peaks = omega_rad_s[inner[is_peak]]
+    width = np.nanmean(np.abs(sides[is_peak] - peaks[:, None]), axis=1)
+    return Resonances(omega_rad_s=peaks, decay_1_s=np.maximum(width - decay_1_s, 0.02 * width))
 
 
-def _half_power_frequency(omega: FloatArray, level: FloatArray, peak: int, step: int) -> float:
+def _half_power_frequencies(omega: FloatArray, level: FloatArray, peaks: IntArray, step: int) -> FloatArray:
     """Interpolate where the level falls to a half; infinite where it rises again first, NaN outside the lines."""
-    line = peak
-    while 0 < line < len(level) - 1:
-        line += step
-        if level[line] <= 0.5 * level[peak]:
-            inside = line - step
-            part = (level[inside] - 0.5 * level[peak]) / (level[inside] - level[line])
-            return float(omega[inside] + part * (omega[line] - omega[inside]))
-        if level[line] > level[peak]:
-            return np.inf
-    return np.nan
+    found = np.full(len(peaks), np.nan)
+    left = np.arange(len(peaks))  # those whose end was not reached
+    line = peaks.copy()
+    while len(left):
+        line = line + step
+        here, top = level[line], level[peaks[left]]
+        is_half = here <= 0.5 * top
+        inside, outside = line[is_half] - step, line[is_half]
+        part = (level[inside] - 0.5 * top[is_half]) / (level[inside] - here[is_half])
+        found[left[is_half]] = omega[inside] + part * (omega[outside] - omega[inside])
+        found[left[~is_half & (here > top)]] = np.inf
+        goes_on = ~is_half & (here <= top) & (line > 0) & (line < len(level) - 1)
+        left, line = left[goes_on], line[goes_on]
+    return found
 
 
 def fine_contour(resonances: Resonances, band_hz: tuple[float, float], least_decay_1_s: float) -> ComplexArray:

@@ -145,8 +145,9 @@ def continue_frfs_coarsely(survey: FrfSurvey, s: ComplexArray) -> TransferFuncti
     points = _within_reach(survey, s)
     weights = _line_weights(survey.frfs, points)
     values, level = weights @ survey.frfs.values, _level(survey, points)
-    variance = (_outside_part(survey, points)[:, None] * np.maximum(np.abs(values), level)) ** 2
-    covariance = _noise_covariance(survey, weights) + np.array([np.diag(column) for column in variance.T])
+    outside = (_outside_part(survey, points)[:, None] * np.maximum(np.abs(values), level)) ** 2
+    variance = np.abs(weights) ** 2 @ survey.variance + outside
+    covariance = np.array([np.diag(column) for column in variance.T], np.complex128)
     return _as_transfer_functions(survey, points, values, level, covariance)
 
 
@@ -212,7 +213,8 @@ def _level(survey: FrfSurvey, s: ComplexArray) -> FloatArray:
 def _line_weights(frfs: FrfSet, s: ComplexArray) -> ComplexArray:
     """Weights of the lines at each point, (n_points, n_lines), that sum to 1."""
     lines, *_ = _kernel_parts(frfs, s)
-    return np.asarray(lines / lines.sum(1, keepdims=True))
+    lines /= lines.sum(1, keepdims=True)
+    return lines
 
 
 def _outside_part(survey: FrfSurvey, s: ComplexArray) -> FloatArray:
@@ -239,16 +241,18 @@ def _kernel_parts(frfs: FrfSet, s: ComplexArray) -> tuple[ComplexArray, ComplexA
     omega = 2 * np.pi * frfs.frequency_hz
     share = np.gradient(omega)
     distance = (s.real - frfs.window_decay_1_s)[:, None]
-    along = omega[None] - s.imag[:, None]
-    size = 2 / np.pi * share * (distance / (distance**2 + along**2)) ** 2  # far faster than complex powers
-    lines = np.empty(along.shape, np.complex128)
-    lines.real, lines.imag = size * distance, -size * along
+    lines = np.empty((len(s), len(omega)), np.complex128)
+    for row, point, away in zip(lines, s, distance[:, 0], strict=True):  # one fits into a cache, all of them do not
+        along = omega - point.imag
+        size = 2 / np.pi * share * (away / (away**2 + along**2)) ** 2  # far faster than complex powers
+        row.real, row.imag = size * away, -size * along
     low, high = omega[0] - share[0] / 2, omega[-1] + share[-1] / 2
     steps = np.array([0.0, *OUTSIDE_SUBBANDS])
     below = -np.diff(_kernel_integral(low - omega[0] * steps - s.imag[:, None], distance), axis=1)
     above = np.diff(_kernel_integral(high + omega[-1] * steps - s.imag[:, None], distance), axis=1)
     total = lines.sum(1) + below.sum(1) + above.sum(1)
-    return lines / total[:, None], below / total[:, None], above / total[:, None]
+    lines /= total[:, None]
+    return lines, below / total[:, None], above / total[:, None]
 
 
 def _kernel_integral(along: FloatArray, distance: FloatArray) -> ComplexArray:
