@@ -191,6 +191,22 @@ def test_offsets_are_removed(tmp_path):
     assert "DC offset of force: 2 N" in result.records.marks[0]
 
 
+@pytest.mark.parametrize(("step", "noise"), [(0.0, 0.02), (0.05, 0.02)], ids=["fine", "coarse"])
+def test_offset_is_seen_beside_the_ringing_of_a_filter_before_a_strong_impact(tmp_path, step, noise):
+    """The ringing is some 100 times the noise, so that among it every offset could be chance."""
+    rng, offset = np.random.default_rng(5), np.array([0.0, 0.04, -0.04])[:, None]
+    signals = impact(Structure(), noise=noise, rng=rng) + offset
+    n_before = int(np.argmax(np.abs(signals[0]) > 1.0))
+    signals[1:, :n_before] += 3.0 * (-0.6) ** np.arange(n_before, 0, -1)
+    if step:
+        signals = step * np.round(signals / step)
+    write_csv(tmp_path / "hits" / "p_0.csv", signals, 1 / 2048)
+    (record,) = read_records(read_test(write_test(tmp_path, HIT)), IngestOptions())
+    removed = signals[1:, :1] - record.responses[:, :1]
+    scatter = np.hypot(noise, step / np.sqrt(12)) / np.sqrt(n_before)
+    np.testing.assert_allclose(removed, offset[1:], rtol=0, atol=4 * scatter)  # a false alarm in some 10 000
+
+
 def test_motion_from_the_impact_before_is_no_offset(tmp_path):
     """A slow mode that still moves looks like a constant for as long as the recording shows before the next impact."""
     step_s, offsets = 1 / 32768, np.array([[0.0], [0.02], [-0.03]])

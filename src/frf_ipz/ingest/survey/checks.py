@@ -28,6 +28,7 @@ WEAK_DB = 0.0  # the response is below its noise
 INITIAL_MOTION = 0.02  # of the highest response: motion before the impact
 SIGNIFICANT = 5.0  # standard deviations of a mean
 OFFSET = 0.01  # of the highest value: an offset that is reported
+STD_OF_MEDIAN = 1.4826  # standard deviation of normal values over the median of their moduli
 FEWEST_BEFORE = 16  # samples before the pulse from which an offset can be estimated
 
 
@@ -274,11 +275,18 @@ def _find_weak_impact(pulse: Pulse, snr_db: float) -> tuple[str, ...]:
 
 
 def _estimate_offset(before: FloatArray) -> float:
-    """Estimate a constant part from what is recorded before the impact; 0 where it could be chance."""
+    """Estimate a constant part from what is recorded before the impact; 0 where it could be chance.
+
+    Just before a strong impact the filter of a converter rings by far more than the noise: those samples do not count.
+    Of a coarse converter half of the samples may be one reading, which hides noise below its digital step.
+    """
     if len(before) < FEWEST_BEFORE:
         return 0.0
-    mean, spread = float(before.mean()), float(before.std())
-    return mean if abs(mean) > SIGNIFICANT * spread / np.sqrt(len(before)) else 0.0
+    deviation = np.abs(before - np.median(before))
+    noise = max(STD_OF_MEDIAN * float(np.median(deviation)), digital_step(before))
+    quiet = before[deviation <= SIGNIFICANT * noise]
+    mean, spread = float(quiet.mean()), float(quiet.std())
+    return mean if abs(mean) > SIGNIFICANT * spread / np.sqrt(len(quiet)) else 0.0
 
 
 def _find_initial_motion(
