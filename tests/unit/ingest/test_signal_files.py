@@ -6,6 +6,7 @@ import struct
 import wave
 import zipfile
 
+import lvm_read
 import numpy as np
 import openpyxl
 import pytest
@@ -108,6 +109,20 @@ def test_segments_of_labview_are_records_of_their_own(tmp_path):
     assert "2 segments" in contents.notes[0]
     table = next(open_recording(tmp_path / "a.lvm", ["force #2", "acc_1 #2"]).blocks)
     np.testing.assert_array_equal(table[:, 1:].T, SIGNALS[:2])
+
+
+@pytest.mark.parametrize("remark", ["", "loud"])
+def test_rows_of_labview_are_read_by_its_reader_only_where_they_hold_text(tmp_path, remark, monkeypatch):
+    path = tmp_path / "a.lvm"
+    write_lvm(path, decimal=",", segments=2)
+    *rows, end, _ = path.read_text().split("\n")
+    path.write_text("\n".join([*rows, f"{end}\t{remark}" if remark else end, ""]))
+    given = []
+    read = lvm_read.read_str
+    monkeypatch.setattr(lvm_read, "read_str", lambda text: given.append(text.count("\n")) or read(text))
+    table = next(open_recording(path, ["force #2", "acc_1 #2"]).blocks)
+    np.testing.assert_array_equal(table[:, 1:].T, SIGNALS[:2])
+    assert (given[-1] > 1000) == bool(remark)  # two segments of 512 rows
 
 
 @pytest.mark.parametrize("width", [1, 2, 4])

@@ -6,10 +6,13 @@ behind their names, as in ``force #2``: each is a record of its own, for a ``[[h
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import lazy_loader
 import numpy as np
+import pyarrow as pa
+import pyarrow.csv as arrow_csv
 
 from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.ingest.formats.signal_table import SAME_RATE, Signal, SignalFormat, SignalTable, even_times
@@ -28,6 +31,7 @@ lvm_read = lazy_loader.load("lvm_read")
 KIND = "a LabVIEW measurement file"
 ABSCISSA, COMMENT = "X_Value", "Comment"
 MOST_CHANNELS = 4096
+NAMES_LINE = re.compile(r"^X_Value([\t,;]).*\r?\n", re.MULTILINE)
 SAME_STEP = 0.5  # of a step: a segment that begins nearer to the end of the one before goes on
 
 
@@ -38,7 +42,7 @@ def _recognises(head: bytes) -> bool:
 def _read(path: Path, keys: TableKeys) -> SignalTable:
     del keys
     with errors_of_reader(path, KIND):
-        content: dict[Any, Any] = lvm_read.read_str(decode(read_bytes(path).removeprefix(b"\xef\xbb\xbf")))
+        content = _read_content(decode(read_bytes(path).removeprefix(b"\xef\xbb\xbf")))
         segments = [_segment_signals(content[number]) for number in range(content["Segments"])]
     joined = [segments[0]] if segments else []
     for segment in segments[1:]:
@@ -57,6 +61,44 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
 
 
 FORMAT = SignalFormat(rank=10, recognises=_recognises, read=_read)
+
+
+def _read_content(text: str) -> dict[Any, Any]:
+    """Give what `lvm_read` does: it reads the heads, and rows too where not all of a segment's fields are numbers."""
+    heads, rows, end = [], [], 0
+    while names := NAMES_LINE.search(text, end):
+        heads.append(text[end : names.end()])
+        stop = re.compile(rf"^{names[1]}?\r?$", re.MULTILINE).search(text, names.end())
+        end = stop.start() if stop else len(text)
+        rows.append((names[1], text[names.end() : end]))
+    content: dict[Any, Any] = lvm_read.read_str("".join([*heads, text[end:]]))
+    segments = [number for number in range(content["Segments"]) if "data" in content[number]]
+    try:
+        tables = [_read_rows(*row, content["Decimal_Separator"]) for row in rows]
+    except pa.ArrowInvalid:
+        tables = []
+    if not tables or len(tables) != len(segments):
+        whole: dict[Any, Any] = lvm_read.read_str(text)
+        return whole
+    for number, table in zip(segments, tables, strict=True):
+        content[number]["data"] = table[:, 1:] if content.get("X_Columns") == "No" else table
+    return content
+
+
+def _read_rows(separator: str, text: str, decimal: str) -> FloatArray:
+    """Read rows of as many numbers each, where an empty field is no number; a hundred times faster than `lvm_read`."""
+    if not text.strip():
+        return np.empty((0, 0))
+    names = [f"{number}" for number in range(text.partition("\n")[0].count(separator) + 1)]
+    table = arrow_csv.read_csv(
+        pa.BufferReader(text.encode()),
+        read_options=arrow_csv.ReadOptions(column_names=names, use_threads=False),
+        parse_options=arrow_csv.ParseOptions(delimiter=separator),
+        convert_options=arrow_csv.ConvertOptions(
+            column_types=dict.fromkeys(names, pa.float64()), decimal_point=decimal
+        ),
+    )
+    return np.column_stack([column.to_numpy() for column in table.columns])
 
 
 def _segment_signals(segment: dict[str, Any]) -> list[Signal]:
