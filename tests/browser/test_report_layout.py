@@ -19,6 +19,14 @@ return [...document.querySelectorAll('body *')].filter((e) => {
   return box.width > 0 && box.right > shown + 1 && !e.closest('.scroll, pre, .main-svg, .skip');
 }).map((e) => e.outerHTML.slice(0, 80));
 """
+OUTSIDE = """
+const around = (element) => element.getBoundingClientRect();
+return [...document.querySelectorAll('.plot .main-svg text')].filter((text) => {
+  const [words, picture] = [around(text), around(text.closest('.plot'))];
+  const beyond = Math.max(picture.left - words.left, words.right - picture.right, words.bottom - picture.bottom);
+  return words.width > 0 && beyond > 1;
+}).map((text) => text.closest('figure').id + ': ' + text.textContent);
+"""
 CONTRASTS = """
 const numbers = (text) => text.match(/[\\d.]+/g).slice(0, 3).map(Number);
 const light = (rgb) => {
@@ -122,6 +130,7 @@ def test_nothing_is_wider_than_a_narrow_screen(browser, written, page, theme):
     open_page(browser, written)
     assert page.execute_script("return document.documentElement.scrollWidth") <= 390
     assert page.execute_script(FRAME) == []
+    assert page.execute_script(OUTSIDE) == []
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

@@ -5,7 +5,7 @@ What it says in words, what lies beside it and what `diagnosis.json` says of it 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 
 from frf_ipz.dofs import Dof
@@ -43,7 +43,7 @@ class Location(Mapping[str, object]):
     >>> import frf_ipz
     >>> location = frf_ipz.Location.at_node(3, "x")
     >>> location, dict(location), location.text
-    (Location(nodes=(3,), directions=('x',)), {'nodes': [3]}, 'nodes 3')
+    (Location(nodes=(3,), directions=('x',)), {'nodes': [3]}, 'node 3')
     """
 
     end: str = ""
@@ -93,13 +93,13 @@ class Location(Mapping[str, object]):
 
     @property
     def text(self) -> str:
-        """For a table: ``channels acc_1; nodes 3``."""
-        return "; ".join(f"{name} {items}" for name, items in self._items_as_text())
+        """For a table: ``channel acc_1; node 3``."""
+        return "; ".join(self._items_as_text())
 
     @property
     def words(self) -> str:
         """For a sentence: ``channel acc_1 and node 3``."""
-        return " and ".join(f"{name.removesuffix('s')} {items}" for name, items in self._items_as_text())
+        return " and ".join(self._items_as_text())
 
     def is_near(self, other: Location, reach: int) -> bool:
         """Tell whether another location is the same but for a sign, and for nodes or elements this near."""
@@ -114,11 +114,20 @@ class Location(Mapping[str, object]):
     def _named(self) -> tuple[object, ...]:
         return self.end, self.channels, self.springs, self.groups, self.directions, self.form
 
-    def _items_as_text(self) -> list[tuple[str, str]]:
+    def _items_as_text(self) -> list[str]:
+        """Name each entry, one of several as such; a segment by its ends."""
         return [
-            (name, ", ".join(map(str, items)) if isinstance(items, list) else str(items))
-            for name, items in self.items()
+            f"{name if len(self._ends(name)) > 1 else name.removesuffix('s')} "
+            f"{(' to ' if name == 'elements' else ', ').join(map(str, self._ends(name)))}"
+            for name in self
         ]
+
+    def _ends(self, name: str) -> Sequence[object]:
+        """Give the items of an entry, an end as one, a segment of one element too."""
+        items: str | tuple[object, ...] = getattr(self, name)
+        if isinstance(items, str):
+            return (items,)
+        return items[:1] if name == "elements" and len(set(items)) == 1 else items
 
     def __getitem__(self, key: str) -> object:
         """Give an entry of `diagnosis.json`: text for an end, a list for all others."""

@@ -31,7 +31,7 @@ def package_versions() -> dict[str, str]:
 
 @cache
 def code_digest() -> str:
-    """Digest the code of this package as it lies on the disk.
+    """Digest the code of this package as it lies on the disk, with the scripts, styles and templates of its pages.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def code_digest() -> str:
     """
     folder = Path(frf_ipz.__file__).parent
     content = hashlib.sha256()
-    for path in sorted(folder.rglob("*.py")):
+    for path in sorted(path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pyc"):
         content.update(path.relative_to(folder).as_posix().encode() + b"\0" + read_bytes(path) + b"\0")
     return content.hexdigest()
 

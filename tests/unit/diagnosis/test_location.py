@@ -11,6 +11,20 @@ JOINT = Location(end="left", nodes=(1,), directions=("ry",))
 SENSOR = Location(channels=("acc_1",), nodes=(3, 4), directions=("z",))
 
 
+@pytest.mark.parametrize(
+    ("location", "text"),
+    [
+        (Location(elements=(4, 4)), "element 4"),
+        (Location(elements=(4, 9)), "elements 4 to 9"),
+        (Location(end="left", nodes=(1,)), "end left; node 1"),
+        (Location(springs=("left", "tip")), "springs left, tip"),
+        (Location(), ""),
+    ],
+)
+def test_one_is_named_as_one(location, text):
+    assert location.text == text
+
+
 def test_as_a_mapping_it_is_what_the_contract_says_of_it():
     assert json.dumps(dict(JOINT)) == '{"end": "left", "nodes": [1]}'
     assert list(SENSOR) == ["channels", "nodes"]
@@ -27,7 +41,7 @@ def test_it_equals_a_mapping_by_its_entries_and_another_location_by_all_that_dis
 
 
 def test_its_words():
-    assert (SENSOR.text, SENSOR.words) == ("channels acc_1; nodes 3, 4", "channel acc_1 and node 3, 4")
+    assert (SENSOR.text, SENSOR.words) == ("channel acc_1; nodes 3, 4", "channel acc_1 and nodes 3, 4")
     assert repr(Location.on_channel("a", sign=-1)) == "Location(channels=('a',), sign=-1)"
     assert Location.at_node(7, "z").dof == Dof(7, "z")
 

@@ -175,11 +175,12 @@ def test_an_effect_that_is_saved_between_being_digested_and_executed_is_refused(
         read_class("own.py:New", campaign, (Effect,))
 
 
-def test_the_code_of_the_package_is_digested(monkeypatch, tmp_path):
+@pytest.mark.parametrize("name", ["part.py", "page.js", "page.css", "card.html"])
+def test_the_code_of_the_package_and_of_its_pages_is_digested(monkeypatch, tmp_path, name):
     (tmp_path / "__init__.py").write_text("first", encoding="utf-8")
     monkeypatch.setattr(frf_ipz, "__file__", str(tmp_path / "__init__.py"))
     first = software.code_digest.__wrapped__()
-    (tmp_path / "part.py").write_text("second", encoding="utf-8")
+    (tmp_path / name).write_text("second", encoding="utf-8")
     assert software.code_digest.__wrapped__() != first
     assert software.package_versions()["numpy"] == np.__version__
 

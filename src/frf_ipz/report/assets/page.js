@@ -18,6 +18,9 @@
   const NO_CLOUD = { displaylogo: false, showSendToCloud: false, plotlyServerURL: "" }; // measurements stay on this machine
   const PRINT_WIDTH = 680, PRINT_SHARE = 0.8; // of the height on a screen: paper is narrower
   const PX_A_TICK = { x: 60, y: 26 }, PX_BESIDE = { x: 118, y: 90 }; // of labels; of margins and legend
+  const PX_A_LETTER = 6.5; // of a title, on average
+  const MOST_FOR_NAMES = 0.4; // of the width, for the names beside bars
+  const FEW_TICKS = 5; // plotly takes no fewer by itself
   const DECADES_A_TICK = 0.31; // plotly: labels 1, 2 and 5 of each decade for more than 0.3 decades a tick
   const MOST_ROWS_TO_OPEN = 40; // longer tables under pictures are for the screen: on paper they would fill pages
   const NARROW_PX = 480, FEW_ENTRIES = 6; // a legend of so many entries there is one entry a row
@@ -72,9 +75,15 @@
     const full = { ...base, ...layout };
     full.width = printing ? PRINT_WIDTH : undefined;
     for (const key of Object.keys(full).filter((name) => /^[xy]axis\d*$/.test(name))) {
-      const line = { gridcolor: grid, linecolor: muted, zerolinecolor: grid, tickcolor: muted, automargin: true, showline: true };
-      full[key] = { ...line, ticks: "outside", ...full[key] };
-      if (full[key].nticks) full[key].nticks = Math.max(Math.min(full[key].nticks, roomForTicks(key, full[key], element)), 1);
+      const line = { gridcolor: grid, linecolor: muted, zerolinecolor: grid, tickcolor: muted, showline: true, ticklabeloverflow: "allow" };
+      const text = wrapped(full[key].title?.text, key, full[key], element);
+      const hasNames = "ticktext" in full[key] || full[key].type === "category";
+      // Margins hold numbers and a title of one line: to measure those would take a third of the time.
+      const automargin = hasNames || text !== full[key].title?.text;
+      full[key] = { ...line, automargin, ticks: "outside", ...full[key], title: { ...full[key].title, text } };
+      if (hasNames && key === "yaxis") Object.assign(full[key], shortNames(full[key], element));
+      const room = Math.max(roomForTicks(key, full[key], element), 1);
+      if (full[key].nticks || (room < FEW_TICKS && !hasNames)) full[key].nticks = Math.min(full[key].nticks || room, room);
     }
     if ("frequency" in element.dataset) {
       const shown = range || layout.xaxis.range;
@@ -95,6 +104,27 @@
     const plot = figure.querySelector(".plot");
     const size = key[0] === "y" ? plot.clientHeight : printing ? PRINT_WIDTH : plot.clientWidth;
     return Math.floor((size - PX_BESIDE[key[0]]) * (domain[1] - domain[0]) / PX_A_TICK[key[0]]);
+  }
+
+  // A title that is longer than its axis goes on in a second line.
+  function wrapped(text, key, { domain = [0, 1] }, figure) {
+    const plot = figure.querySelector(".plot");
+    const size = key[0] === "x" ? (printing ? PRINT_WIDTH : plot.clientWidth) : plot.clientHeight * (domain[1] - domain[0]);
+    return inTwoLines(text, size - PX_BESIDE[key[0]]);
+  }
+
+  // Names beside bars leave room for the bars.
+  function shortNames({ ticktext, tickvals }, figure) {
+    const names = ticktext || [...new Set(pictureIn(figure).data.flatMap(({ y }) => (Array.isArray(y) ? y : [])))];
+    const most = figure.querySelector(".plot").clientWidth * MOST_FOR_NAMES;
+    return { tickvals: tickvals || names, ticktext: names.map((name) => inTwoLines(name, most)) };
+  }
+
+  function inTwoLines(text, size) {
+    if (!text || text.length * PX_A_LETTER < size || text.includes("<br>")) return text;
+    const spaces = [...text.matchAll(/ /g)].map(({ index }) => index);
+    const [middle] = spaces.sort((a, b) => Math.abs(a - text.length / 2) - Math.abs(b - text.length / 2));
+    return middle ? `${text.slice(0, middle)}<br>${text.slice(middle + 1)}` : text;
   }
 
   const choiceIn = (figure) => figure.querySelector("select");
