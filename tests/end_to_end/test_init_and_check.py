@@ -440,6 +440,14 @@ def test_init_says_where_no_column_can_be_the_force(campaign):
         columns_of_init(campaign, "time [s],a [mm/s],b [g]")
 
 
+def test_a_force_by_its_name_is_one_where_all_units_are_those_of_motions(campaign):
+    found = columns_of_init(campaign, "time [s],force [g],acc [m/s^2]")
+    assert [quantity for _, quantity in found] == ["force", "acceleration"]
+    text = (campaign / "test.toml").read_text(encoding="utf-8")
+    assert re.search('unit = "N" .*the files say g   CHECK\nwrong_file_unit = "g"\n', text)
+    assert "used" in look_without_model(campaign)
+
+
 def test_a_voltage_needs_its_sensitivity(campaign):
     (campaign / "model.toml").unlink()
     for path in (campaign / "hits").glob("*.csv"):

@@ -49,6 +49,8 @@ class Channel:
         ``force``, ``acceleration``, ``velocity`` or ``displacement``.
     unit, sensitivity : str
         At most one is not empty; where both are, the files' row of units counts.
+    wrong_file_unit : str
+        What files state and is wrong; it is passed over.
     dof : Dof, optional
         Where an output sits, unless a set-up says otherwise.
     mass_kg : float
@@ -79,6 +81,7 @@ class Channel:
     quantity: str
     unit: str = ""
     sensitivity: str = ""
+    wrong_file_unit: str = ""
     dof: AnyDof | None = None
     mass_kg: float = 0.0
 

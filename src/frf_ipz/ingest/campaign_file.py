@@ -111,6 +111,9 @@ class ChannelKeys:
         Of the column: anything that pint reads. Not needed where the files have a row of units.
     sensitivity : str, optional
         Instead of the unit, for example ``"10.2 mV/g_0"``: the column is then in the numerator's unit.
+    wrong_file_unit : str, optional
+        A unit that the files state for this column and that is wrong, as programs of acquisition put one there by
+        themselves: it is passed over, and `unit` or `sensitivity` counts.
     dof : str, optional
         Where an output sits, or one of several forces acts; a ``[[hit]]`` or ``[[record]]`` may say otherwise.
     mass_kg : float
@@ -124,6 +127,7 @@ class ChannelKeys:
     quantity: Literal["force", "acceleration", "velocity", "displacement"]
     unit: str | None = None
     sensitivity: str | None = None
+    wrong_file_unit: str | None = None
     dof: str | None = None
     mass_kg: NotNegative = 0.0
 
@@ -434,6 +438,8 @@ def _read_channel(path: Path, keys: ChannelKeys) -> Channel:
         raise FileFormatError(path, problem, where=where)
     if keys.unit is not None and keys.sensitivity is not None:
         raise FileFormatError(path, "has both 'unit' and 'sensitivity'; a sensitivity replaces the unit", where=where)
+    if keys.wrong_file_unit is not None and keys.unit is None and keys.sensitivity is None:
+        raise FileFormatError(path, "'wrong_file_unit' needs the right 'unit', or a 'sensitivity'", where=where)
     if keys.role == "input" and keys.mass_kg:
         raise FileFormatError(path, "an input has no 'mass_kg': the shaker is no part of the structure", where=where)
     return Channel(
@@ -442,6 +448,7 @@ def _read_channel(path: Path, keys: ChannelKeys) -> Channel:
         quantity=keys.quantity,
         unit=keys.unit or "",
         sensitivity=keys.sensitivity or "",
+        wrong_file_unit=keys.wrong_file_unit or "",
         dof=None if keys.dof is None else _parse_dof(path, keys.dof, where),
         mass_kg=keys.mass_kg,
     )

@@ -295,10 +295,14 @@ def _time_factor(recording: RawRecording) -> float:
         raise QuantityError(f"{recording.path}, column '{recording.time_column}': {error}") from None
 
 
+def _way_out(file_unit: str) -> str:
+    return f'where the file\'s is, say wrong_file_unit = "{file_unit}" in the [[channel]]'
+
+
 def _channel_factor(path: Path, channel: Channel, dof: AnyDof, file_unit: str) -> float:
     """Return the factor to SI; the units of test and file must agree, and one of them must be stated."""
     rotational = dof.direction.startswith("r")
-    file_unit = file_unit if is_stated(file_unit) else ""
+    file_unit = file_unit if is_stated(file_unit) and file_unit != channel.wrong_file_unit else ""
     test_unit = channel.column_unit
     where = f"{path}, column '{channel.column}'"
     if not test_unit and not file_unit:
@@ -311,12 +315,14 @@ def _channel_factor(path: Path, channel: Channel, dof: AnyDof, file_unit: str) -
                 f"is in '{file_unit}' by the file, and the sensitivity '{channel.sensitivity}' wants '{test_unit}'"
             )
             raise QuantityError(
-                f"{where}: {problem}; where the file is in that unit already, leave the sensitivity out"
+                f"{where}: {problem}; where the file is in that unit already, leave the sensitivity out; "
+                f"{_way_out(file_unit)}"
             )
         factor = sensitivity_factor(channel.sensitivity, channel.quantity, rotational=rotational)
         return factor if ratio is None else factor * ratio
     if ratio not in {None, 1.0}:
         problem = f"is in '{file_unit}' by the file and in '{test_unit}' by the test; correct the one that is wrong"
+        problem += f"; {_way_out(file_unit)}"
         raise QuantityError(f"{where}: {problem}")
     try:
         return unit_factor(test_unit or file_unit, channel.quantity, rotational=rotational)

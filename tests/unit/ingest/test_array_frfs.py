@@ -158,3 +158,15 @@ def test_lines_of_a_whole_transform(tmp_path):
     for variables in ({}, {"frf": "yspec", "sample_rate_hz": "freq"}):
         frfs = read(tmp_path / "a.mat", output="1:+z", input="1:+z", variables=variables)
         np.testing.assert_allclose(frfs.frequency_hz[1:], LINES_HZ)
+
+
+def test_frfs_that_are_each_followed_by_their_coherence(tmp_path):
+    """As Cambridge's data logger saves them: real numbers from 0 to 1 are no FRF."""
+    n_lines = 129
+    frf = 1.0 / (1.0 - np.linspace(0.0, 3.0, n_lines) ** 2 + 0.02j)
+    columns = np.column_stack([frf, np.full(n_lines, 0.9), 2 * frf, np.linspace(0.0, 1.0, n_lines)])
+    numbers = {"tfun": 1, "npts": 256.0, "freq": 512.0, "dt2": np.array([0.0, 4.0, 0.0])}
+    scipy.io.savemat(tmp_path / "a.mat", {"yspec": columns, **numbers})
+    frfs = frf_ipz.read_frfs(tmp_path / "a.mat", quantity="receptance", output=["1:+z", "2:+z"], input="1:+z")
+    np.testing.assert_array_equal(frfs.values, columns[:, ::2])
+    np.testing.assert_array_equal(frfs.coherence, columns[:, 1::2].real)

@@ -200,3 +200,12 @@ def test_damaged_files_are_one_line(tmp_path, name):
             next(open_recording(tmp_path / name, ["force", "first"]).blocks)
         except InputError:
             continue
+
+
+def test_a_lone_frequency_beside_signals_is_their_rate(tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"indata": SIGNALS.T, "freq": RATE_HZ, "buflen": 512.0, "tsmax": 1.0})
+    table, notes = read(
+        tmp_path / "a.mat", 'variables = { force = "indata(:,1)", first = "indata(:,2)", second = "indata(:,3)" }'
+    )
+    expect(table)
+    assert "2048 samples a second by 'freq'" in notes[0]

@@ -196,3 +196,16 @@ def test_all_records_of_one_dof_with_a_different_step(path):
         path.read_text(encoding="utf-8") + '[[hit]]\ndof = "8:+z"\nfiles = ["late/*.csv"]\n', encoding="utf-8"
     )
     assert re.search(r"all records at 8:\+z have the time step 0\.000976.* s.*export them with one step", message(path))
+
+
+def test_a_unit_that_the_files_state_wrongly_is_passed_over_where_the_test_says_so(path):
+    for csv in (path.parent / "hits").glob("*.csv"):
+        head, _, rows = csv.read_text(encoding="utf-8").partition("\n")
+        csv.write_text(f"{head}\ns,Volts,m/s^2,m/s^2\n{rows}", encoding="utf-8")
+    assert 'where the file\'s is, say wrong_file_unit = "Volts"' in message(path)
+    change(path, 'unit = "N"', 'unit = "N"\nwrong_file_unit = "g"')
+    assert "is in 'Volts' by the file and in 'N' by the test" in message(path)
+    change(path, '"g"', '"Volts"')
+    assert estimate_frfs(read_test(path)).records["peak_force_N"].max() > 1.0
+    change(path, 'unit = "N"\n', "")
+    assert "'wrong_file_unit' needs the right 'unit', or a 'sensitivity'" in message(path)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 FREQUENCIES = {"frequency_hz": 1.0, "frequency_rad_s": 1.0 / (2.0 * np.pi)}
 PARTS = ("frf", "real", "imag", "magnitude", "magnitude_db", "phase_deg", "phase_rad")
 GRID = ("frequency_step_hz", "frequency_start_hz")
+ROUNDED = 1e-6  # beyond 1, of a coherence computed in single precision
 SAMPLE_RATE = "sample_rate_hz"  # the lines go from 0 Hz to half of it
 KNOWN = (*FREQUENCIES, *GRID, SAMPLE_RATE, *PARTS, "coherence", "variance")
 FREQUENCY = re.compile(r"(f|ff|freq\w*|frf?_?freq\w*|frequenz\w*|hz|f_?(vec|axis|hz)\w*|x)", re.IGNORECASE)
@@ -305,18 +306,33 @@ def _blocks_by_shape(arrays: FileArrays, variables: Mapping[str, str]) -> list[F
             if COHERENCE.match(last_part(other)) and array.shape == values.shape and not np.iscomplexobj(array)
         ]
         about = f"FRFs in '{name}' ({describe(values)}), frequencies in '{frequency_name}'"
+        coherence = coherences[0][1] if len(coherences) == 1 else None
+        about += f", coherence in '{coherences[0][0]}'" if len(coherences) == 1 else ""
+        if coherence is None and _alternates(shaped):
+            shaped, coherence = shaped[:, ::2], np.real(shaped[:, 1::2])
+            about += ", each followed by its coherence"
         blocks.append(
             FrfBlock(
                 name=name,
                 frequency_hz=frequency_hz,
                 values=shaped,
                 ends=_ends_beside(arrays, name, shaped.shape[1:]),
-                coherence=coherences[0][1] if len(coherences) == 1 else None,
+                coherence=coherence,
                 unit=_unit_beside(arrays, name),
-                about=about + (f", coherence in '{coherences[0][0]}'" if len(coherences) == 1 else ""),
+                about=about,
             )
         )
     return blocks
+
+
+def _alternates(values: NumericArray) -> bool:
+    """Tell whether every second column is real and from 0 to 1, a coherence, as Cambridge's data logger saves them."""
+    n_columns = values.shape[1]
+    if n_columns % 2 or values.shape[2] != 1:
+        return False
+    frfs, others = values[:, ::2], values[:, 1::2]
+    is_share = not np.any(others.imag) and bool(((others.real >= 0.0) & (others.real <= 1.0 + ROUNDED)).all())
+    return is_share and bool(np.any(frfs.imag, axis=0).all())
 
 
 def _complex_arrays(arrays: FileArrays) -> list[tuple[str, ComplexArray]]:

@@ -29,8 +29,9 @@ FEWEST_SAMPLES = 16  # of a recording
 MOST_COLUMNS = 1024  # of a matrix whose columns are signals
 EVEN = 0.01  # the contract's limit for a step that differs
 RATE = re.compile(
-    r"(fs|sf|sr|srate|fsamp\w*|sampl\w*[_ ]?(rate|freq\w*)([_ ]?hz)?|rate(_hz)?|abtastrate)", re.IGNORECASE
+    r"(f_?s|sf|sr|srate|fsamp\w*|sampl\w*[_ ]?(rate|freq\w*)([_ ]?hz)?|rate(_hz)?|abtastrate)", re.IGNORECASE
 )
+FREQUENCY = re.compile(r"freq\w*", re.IGNORECASE)  # a rate where nothing else is one
 STEP = re.compile(
     r"(dt|delta_?t|ts|t_?s|time_?step|step_?s|t_?sample|sampl\w*_?(time|period|interval)|wf_increment)", re.I
 )
@@ -254,6 +255,9 @@ def _find_rate(arrays: FileArrays, rate_variable: str) -> tuple[float | None, st
     for name, number in singles.items():
         if STEP.fullmatch(last_part(name)) and number < 1.0:
             return 1.0 / number, name
+    for name, number in singles.items():
+        if FREQUENCY.fullmatch(last_part(name)) and number > 1.0:
+            return number, name
     return None, ""
 
 

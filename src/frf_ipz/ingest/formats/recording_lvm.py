@@ -90,7 +90,7 @@ def _read_rows(separator: str, text: str, decimal: str) -> FloatArray:
     if not text.strip():
         return np.empty((0, 0))
     names = [f"{number}" for number in range(text.partition("\n")[0].count(separator) + 1)]
-    table = arrow_csv.read_csv(
+    reader = arrow_csv.open_csv(
         pa.BufferReader(text.encode()),
         read_options=arrow_csv.ReadOptions(column_names=names, use_threads=False),
         parse_options=arrow_csv.ParseOptions(delimiter=separator),
@@ -98,7 +98,7 @@ def _read_rows(separator: str, text: str, decimal: str) -> FloatArray:
             column_types=dict.fromkeys(names, pa.float64()), decimal_point=decimal
         ),
     )
-    return np.column_stack([column.to_numpy() for column in table.columns])
+    return np.column_stack([column.to_numpy() for column in reader.read_all().columns])
 
 
 def _segment_signals(segment: dict[str, Any]) -> list[Signal]:

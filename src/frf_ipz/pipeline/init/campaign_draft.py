@@ -9,7 +9,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource
 from frf_ipz.ingest.formats.registry import look_at_frfs
 from frf_ipz.ingest.units import frf_factor
-from frf_ipz.pipeline.init.columns import UNITS, read_columns
+from frf_ipz.pipeline.init.columns import UNITS, quantity_of, read_columns
 from frf_ipz.pipeline.init.excitation import excitation
 from frf_ipz.pipeline.init.text import HEAD, guessed, quoted, with_comment
 from frf_ipz.quantities import FrfQuantity
@@ -122,6 +122,9 @@ def _channel(column: Column, role: str) -> list[str]:
     lines.append(quantity if column.is_known else guessed(quantity, QUANTITIES))
     if column.unit_tells:
         lines.append(with_comment("# unit", f"the files say {column.file_unit}"))
+    elif quantity_of(column.file_unit):
+        lines.append(guessed(f'unit = "{UNITS[column.quantity]}"', f"the files say {column.file_unit}"))
+        lines.append(f"wrong_file_unit = {quoted(column.file_unit)}")
     elif column.file_unit:
         needed = f"needed: the files are in {column.file_unit}"
         lines.append(guessed(f"# sensitivity = {quoted(SENSITIVITY)}", needed))

@@ -120,7 +120,8 @@ def read_columns(files: Sequence[Path]) -> Columns:
         raise InputError(f"{files[0]}: a force and a response are needed besides the time; its columns are {shown}")
     forces = [column for column in columns if column.quantity == "force"]
     if not forces:  # the first is it most often, unless its unit says that it is a motion
-        guess = next((column for column in columns if not column.unit_tells), None)
+        by_name = [name for name, known in zip(names, first.columns, strict=True) if _named(known.label) == "force"]
+        guess = next((column for column in columns if not column.unit_tells or column.name in by_name), None)
         if guess is None:
             units = ", ".join(f"'{name_and_unit(column.name)[0]}' in {column.file_unit}" for column in columns)
             raise InputError(f"{files[0]}: none of the columns is a force: {units}; FRFs need the force too")
@@ -164,11 +165,16 @@ def _common_names(contents: Mapping[Path, RecordingContents]) -> list[str]:
     return first
 
 
-def _column(written: str, name: str, unit: str) -> Column:
+def _named(name: str) -> str | None:
+    """Tell a quantity by the name of a column."""
     by_name = next((quantity for quantity, pattern in NAMES.items() if pattern.search(name)), None)
     letter = LETTER.match(name)
-    by_name = LETTERS[letter[1].lower()] if by_name is None and letter else by_name
-    by_unit = _quantity_of(unit)
+    return LETTERS[letter[1].lower()] if by_name is None and letter else by_name
+
+
+def _column(written: str, name: str, unit: str) -> Column:
+    by_name = _named(name)
+    by_unit = quantity_of(unit)
     return Column(
         name=written,
         quantity=by_unit or by_name or "acceleration",
@@ -178,8 +184,19 @@ def _column(written: str, name: str, unit: str) -> Column:
     )
 
 
-def _quantity_of(unit: str) -> str | None:
-    """Tell a quantity by a unit; None where it is one of none, such as V."""
+def quantity_of(unit: str) -> str | None:
+    """Tell the quantity of a recording by its unit.
+
+    Parameters
+    ----------
+    unit : str
+        May be empty.
+
+    Returns
+    -------
+    str or None
+        None where it is one of none, such as V.
+    """
     for quantity in UNITS if unit else ():
         try:
             unit_factor(unit, quantity)
