@@ -113,7 +113,9 @@ def kill_before(case, number):
     return judge(case, out)
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize(
+    "verb", [verb if verb == "run" else pytest.param(verb, marks=pytest.mark.slow) for verb in VERBS]
+)
 def test_killed_before_some_changes_it_is_the_old_or_the_new_whole(cases, verb):
     case = cases(verb)
     assert case.n_changes > N_MOMENTS

@@ -57,6 +57,7 @@ def test_the_point_of_interest_is_right(update):
     assert row["dB"] <= WITHIN_DB
 
 
+@pytest.mark.slow
 def test_it_beats_the_trivial_answer_in_db_and_zeros_and_so_does_the_table():
     rows = compare_section_4()
     ours, trivial = rows.loc["minimal-change, elements"], rows.loc["measured poles, nominal shapes"]

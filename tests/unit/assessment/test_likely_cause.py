@@ -66,6 +66,7 @@ def heavier():
     return machine, frfs, frf_ipz.fit_modes(frfs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changed", [{}, {"youngs_modulus_Pa": 210e9}])
 def test_what_a_diagnosis_found_competes_with_mistakes(heavier, changed):
     """A lump looks like a sensor elsewhere until it is found; a wrong modulus stays one, whatever was found."""

@@ -74,6 +74,7 @@ def test_a_search_without_time_says_what_it_did_not_look_at(search):
     assert looks < 10  # between one hypothesis and the next
 
 
+@pytest.mark.slow
 def test_a_search_that_is_cut_keeps_the_fits_it_has(search):
     whole, looks = search(0.0052, seconds=1e9)
     assert whole.is_complete

@@ -36,6 +36,7 @@ def rms_error(fit, truth):
     return np.sqrt(np.mean(normalised_errors(fit, truth.poles) ** 2))
 
 
+@pytest.mark.slow
 def test_scatter_that_one_impact_does_not_show_is_in_the_standard_deviations():
     truth, frfs = one_impact(3)
     fit = fit_modes(frfs, options=FitOptions())

@@ -113,6 +113,7 @@ def test_ninth_file_of_the_free_beam_with_poles_held(beam):
     assert ninth.misfit["ratio"].max() < 1.6  # where the 112 Hz peak is, whose half width is less than a line
 
 
+@pytest.mark.slow
 def test_steel_beam(recordings):
     frfs = frfs_of(recordings / "steel_beam_5x3" / "test.toml")
     fit = fit_modes(frfs, options=FitOptions(band_hz=(1.0, 600.0)))

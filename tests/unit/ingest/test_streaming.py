@@ -31,6 +31,7 @@ def peak_bytes(test):
     return peak
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_number_of_records(tmp_path, monkeypatch):
     monkeypatch.setattr("frf_ipz.ingest.recording_files.BUDGET", 3 * BYTES_OF_A_RECORD)
     small, large = campaign(tmp_path / "small", 8), campaign(tmp_path / "large", 16)

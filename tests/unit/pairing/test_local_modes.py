@@ -31,6 +31,7 @@ def is_right(run, pair):
     return assigned == likeness.argmax() or likeness.max() < ALIKE
 
 
+@pytest.mark.slow
 def test_few_modes_become_targets_of_another_one(runs):
     targets = [(run, pair) for run in runs for pair in run.pairs.targets if pair.kind == "pole"]
     measured = sum(run.fit.n_modes for run in runs)

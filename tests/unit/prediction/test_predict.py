@@ -177,6 +177,7 @@ def test_a_point_that_the_model_does_not_know_is_refused():
         predict_frfs(measured(()), updated(chain()), points=POINTS, frequency_hz=LINES)
 
 
+@pytest.mark.slow
 def test_bands_cover_the_truth_on_held_back_structures():
     """A slice of the study in frf_testbench/updating/study.py; the whole of it is what is reported."""
     rows = pd.concat([study_structure(seed, with_ipz=False) for seed in range(700, 712)])

@@ -57,6 +57,7 @@ def look_at_run(address, number):
     look_at(address, f"{number}/", f"{number}/shape?mode=0", f"{number}/zoom?low=100&high=104&frfs=0,1")
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_pipelines_that_were_looked_at(original, tmp_path):
     folder = make_campaign(original, tmp_path / "campaign", MORE)
     with serving(folder) as (process, address):

@@ -52,6 +52,7 @@ def test_nothing_has_changed(nominal, real):
     assert comparison.statement.startswith("Nothing has changed")
 
 
+@pytest.mark.slow
 def test_an_added_mass_is_found_though_the_model_is_wrong(nominal, real):
     after = with_point_masses(real, {12: ADDED_KG})
     comparison = frf_ipz.compare_states(state(nominal, real, 1), state(nominal, after, 2), options=FEW)

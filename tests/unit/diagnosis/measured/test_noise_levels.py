@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from frf_ipz.diagnosis.measured.preprocessing.noise_levels import measure_noise_levels
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
@@ -22,6 +23,7 @@ def with_noise(observations, sizes, rng):
     return replace(observations, records=tuple(records))
 
 
+@pytest.mark.slow
 def test_the_level_of_each_record_is_that_of_its_noise(strike):
     noisy = with_noise(strike(), RANGES, np.random.default_rng(3))
     measured = measure_noise_levels(noisy)

@@ -191,6 +191,7 @@ def test_the_initial_state_of_each_mode_follows_from_all_forces_before(successiv
     assert group.initial_state(ordered[2]) is None
 
 
+@pytest.mark.slow
 def test_dc_offsets_of_a_nonlinear_structure_are_read_where_it_has_come_to_rest(strike):
     offsets = OFFSET_PARTS[:, None] * largest(strike(cubic))
     disturbed = shifted(strike(cubic), offsets)

@@ -54,7 +54,9 @@ def localised(chain, strike):
     return localise
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(
+    "name", ["cubic", "gap", pytest.param("outside the catalogue", marks=pytest.mark.slow)], ids=str
+)
 def test_a_force_is_localised_whatever_its_law(localised, name):
     location = LAWS[name][2]
     _, linear, localisation = localised(name)
@@ -118,7 +120,7 @@ def test_the_parameters_of_a_law_are_read_from_the_free_force(localised, name, l
     assert np.isfinite(start.nuisance).all()
 
 
-@pytest.mark.parametrize("far_off", [True, False])
+@pytest.mark.parametrize("far_off", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_a_law_that_the_alternating_fit_loses_is_simulated_as_read_from_the_free_force(localised, monkeypatch, far_off):
     segments, linear, localisation = localised("gap")
     problem = LawFitProblem(segments=segments, linear=linear, localisation=localisation)

@@ -47,6 +47,7 @@ def start_of(nuisance_prior, location, **changes):
     )
 
 
+@pytest.mark.slow
 def test_the_shape_at_the_location_of_a_law_is_fitted(cubic):
     segments, nuisance_prior, location = cubic
     shapes = nuisance_prior.modal_model.at_locations.shapes.copy()

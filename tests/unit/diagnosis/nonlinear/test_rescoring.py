@@ -47,6 +47,7 @@ def fit_at(problem, node):
     )
 
 
+@pytest.mark.slow
 def test_data_that_are_better_than_guessed_distinguish_locations(problem, monkeypatch):
     monkeypatch.setattr(rescoring, "MAX_DIFFERENCE", np.inf)
     right, wrong = fits = [fit_at(problem, node) for node in (3, 2)]

@@ -152,6 +152,7 @@ def test_all_wrong_places_of_a_sensor_in_one_product_are_those_that_are_evaluate
         assert start.cost == pytest.approx(alone.cost, rel=DIGITS)
 
 
+@pytest.mark.slow
 def test_three_effects_are_found_at_once(nominal):
     changed = with_springs(with_point_masses(nominal, {12: 0.02}), {parse_dof("6:z"): 6e3})
     gain = np.array([1.0, 1.06])
