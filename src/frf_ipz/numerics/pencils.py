@@ -206,7 +206,7 @@ def undamped_zeros(mass: FloatArray, stiffness: FloatArray, output_row: FloatArr
     if small_mass.size == 0:
         return _no_roots(len(rows))
     values, y, x = _generalised_eig(rows.T @ stiffness @ columns, small_mass)
-    slope = np.einsum("ik,ij,jk->k", y, small_mass, x)
+    slope = np.sum(y * (small_mass @ x), axis=0)
     return Roots(values=values, right_vectors=columns @ x, left_vectors=rows @ y, slope=slope)
 
 
@@ -315,7 +315,7 @@ def _quadratic_roots(
     second[order:, order:] = mass * (scale**2 / norm)
     values, y, x = _generalised_eig(first, second)
     values, y, x = values * scale, y[order:], x[:order]
-    slope = 2 * values * np.einsum("ik,ij,jk->k", y, mass, x) + np.einsum("ik,ij,jk->k", y, damping, x)
+    slope = 2 * values * np.sum(y * (mass @ x), axis=0) + np.sum(y * (damping @ x), axis=0)
     if rows is not None and columns is not None:
         y, x = rows @ y, columns @ x
     return Roots(values=values, right_vectors=x, left_vectors=y, slope=slope)

@@ -3,6 +3,9 @@
 One eigenvalue problem serves all FRFs. A zero that is known nearly follows from a few steps of Newton's method on that
 sum, and its vectors from the same fractions, where an eigenvalue problem of each FRF would cost the third power of the
 order. ``z`` is the s of a damped model, or the squared frequency of an undamped one.
+
+[Aberth1973] O. Aberth, Iteration methods for finding all zeros of a polynomial simultaneously, Mathematics of
+Computation 27, 1973, 339-344, doi:10.1090/S0025-5718-1973-0329236-7.
 """
 
 from __future__ import annotations
@@ -13,12 +16,15 @@ from typing import TYPE_CHECKING, TypeAlias, cast
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from frf_ipz.numerics.damped_modes import damped_modes
 from frf_ipz.numerics.pencils import Roots, damped_zeros, undamped_poles, undamped_zeros
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 Numbers: TypeAlias = ComplexArray | FloatArray
+REPULSIONS = 100  # steps of zeros that repel one another, which need more where several meet
+GOLDEN = (np.sqrt(5) - 1) / 2  # turns that never repeat
 STEPS = 30  # of Newton's method; from near, four are enough
 CONVERGED = 1e-12  # relative step from which a zero counts as found
 SMALL_RESIDUE = 1e-8  # relative residual of a motion that the poles express well
@@ -190,38 +196,41 @@ def undamped_form(mass: FloatArray, stiffness: FloatArray) -> PoleForm:
     )
 
 
-def damped_form(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> PoleForm:
+def damped_form(
+    mass: FloatArray, damping: FloatArray, stiffness: FloatArray, *, undamped: PoleForm | None = None
+) -> PoleForm:
     """Express a damped model by its poles.
 
     Parameters
     ----------
     mass, damping, stiffness : (r, r) array
         Symmetric; the mass positive definite.
+    undamped : PoleForm, optional
+        The model without damping, where it is known.
 
     Returns
     -------
     PoleForm
         Of s in rad/s.
     """
-    modes = undamped_poles(mass, stiffness)
-    shapes, squares = modes.right_vectors.real, modes.values.real
+    modes = undamped_form(mass, stiffness) if undamped is None else undamped
+    shapes, squares = modes.shapes.real, modes.poles.real
     rates = shapes.T @ damping @ shapes
+    rates = (rates + rates.T) / 2
     top = max(float(np.abs(squares).max(initial=0.0)), np.finfo(float).tiny)
     free = (np.abs(squares) <= RIGID * top) & (np.abs(rates).max(axis=1) <= UNDAMPED * np.abs(rates).max())
     elastic, rates = np.flatnonzero(~free), rates[np.ix_(~free, ~free)]
-    count = len(elastic)
-    scale = np.sqrt(top)
-    state = np.zeros((2 * count, 2 * count))
-    state[:count, count:] = np.eye(count)
-    state[count:, :count] = np.diag(-squares[elastic] / top)
-    state[count:, count:] = -rates / scale
-    values, vectors = np.linalg.eig(state)
-    values, vectors = values * scale, vectors[:count]
-    slope = 2 * values * np.sum(vectors**2, axis=0) + np.einsum("ik,ij,jk->k", vectors, rates, vectors)
+    upper, vectors = damped_modes(squares[elastic], rates)
+    slope = 2 * upper * np.sum(vectors**2, axis=0) + np.sum(vectors * (rates @ vectors), axis=0)
+    oscillates = upper.imag > 0
+
+    def closed(numbers: ComplexArray) -> ComplexArray:
+        return np.concatenate([numbers, numbers[..., oscillates].conj()], axis=-1)
+
     return PoleForm(
-        poles=values.astype(complex),
-        shapes=shapes[:, elastic] @ vectors.astype(complex),
-        slope=slope.astype(complex),
+        poles=closed(upper),
+        shapes=closed(shapes[:, elastic] @ vectors),
+        slope=closed(slope),
         rigid=shapes[:, free],
         mass=mass,
         damping=damping,
@@ -309,13 +318,66 @@ def are_symmetric(*matrices: FloatArray) -> bool:
     return all(np.abs(matrix - matrix.T).max() <= SYMMETRIC * np.abs(matrix).max() for matrix in matrices)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DampedModel:
+    """A symmetric model by its poles, with and without damping.
+
+    Parameters
+    ----------
+    undamped, damped : PoleForm
+        The two.
+    """
+
+    undamped: PoleForm
+    damped: PoleForm
+
+    @classmethod
+    def of(cls, mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> DampedModel | None:
+        """Express a model by its poles.
+
+        Parameters
+        ----------
+        mass, damping, stiffness : (r, r) array
+            The mass positive definite.
+
+        Returns
+        -------
+        DampedModel or None
+            None where the matrices are not symmetric.
+        """
+        if not are_symmetric(mass, damping, stiffness):
+            return None
+        undamped = undamped_form(mass, stiffness)
+        return cls(undamped=undamped, damped=damped_form(mass, damping, stiffness, undamped=undamped))
+
+    def every_zero(self, outputs: FloatArray, inputs: FloatArray) -> list[Roots]:
+        """All zeros of several FRFs, those with an imaginary part of at least 0.
+
+        Zeros without damping are eigenvalues of a diagonal matrix with one of rank 1; damping moves each a little, or,
+        of zeros far from the imaginary axis, so far that several meet, which then repel one another on their way. Where
+        not all are found, the quadratic eigenvalue problem of that FRF is solved.
+
+        Parameters
+        ----------
+        outputs, inputs : (n_frfs, r) array
+            Rows of sensors and excitations.
+
+        Returns
+        -------
+        list of Roots
+            Of each FRF, rad/s.
+        """
+        return [
+            _damped_from_undamped(self.undamped, self.damped, output, force)
+            or _by_pencil(self.undamped.mass, self.damped.damping, self.undamped.stiffness, output, force)
+            for output, force in zip(outputs, inputs, strict=True)
+        ]
+
+
 def every_damped_zero(
     mass: FloatArray, damping: FloatArray, stiffness: FloatArray, outputs: FloatArray, inputs: FloatArray
 ) -> list[Roots]:
     """All zeros of several FRFs of a lightly damped model.
-
-    Zeros without damping are eigenvalues of a diagonal matrix with one of rank 1; damping moves each a little. Where it
-    moves them so far that not each is found again, the quadratic eigenvalue problem of that FRF is solved.
 
     Parameters
     ----------
@@ -331,17 +393,17 @@ def every_damped_zero(
     """
     if not len(outputs):
         return []
-    forms = None
-    if are_symmetric(mass, damping, stiffness):
-        forms = undamped_form(mass, stiffness), damped_form(mass, damping, stiffness)
-    found: list[Roots] = []
-    for output, force in zip(outputs, inputs, strict=True):
-        roots = None if forms is None else _damped_from_undamped(*forms, output, force)
-        if roots is None:
-            every = damped_zeros(mass, damping, stiffness, output, force)
-            roots = every.take(np.flatnonzero(every.values.imag >= -REAL * np.abs(every.values)))
-        found.append(roots)
-    return found
+    model = DampedModel.of(mass, damping, stiffness)
+    if model is not None:
+        return model.every_zero(outputs, inputs)
+    return [_by_pencil(mass, damping, stiffness, *rows) for rows in zip(outputs, inputs, strict=True)]
+
+
+def _by_pencil(
+    mass: FloatArray, damping: FloatArray | None, stiffness: FloatArray, output: FloatArray, force: FloatArray
+) -> Roots:
+    every = damped_zeros(mass, np.zeros_like(mass) if damping is None else damping, stiffness, output, force)
+    return every.take(np.flatnonzero(every.values.imag >= -REAL * np.abs(every.values)))
 
 
 def every_undamped_zero(form: PoleForm, output: FloatArray, force: FloatArray) -> Roots:
@@ -388,11 +450,86 @@ def _damped_from_undamped(undamped: PoleForm, damped: PoleForm, output: FloatArr
     start = np.concatenate([s, -s[is_real]]) - np.concatenate([shift, shift[is_real]])
     outputs, inputs = np.tile(output, (len(start), 1)), np.tile(force, (len(start), 1))
     values, is_found = damped.zeros(outputs, inputs, start)
-    moved = np.abs(values - start) > CLOSE * np.abs(start)
-    if not is_found.all() or moved.any() or _merge(values) or (values.imag < -REAL * np.abs(values)).any():
-        return None
+    is_same = is_found & (np.abs(values - start) <= CLOSE * np.abs(start)) & (_gaps(values) >= MERGED)
+    is_same &= values.imag >= -REAL * np.abs(values)
+    if not is_same.all():
+        complete = _repelled(damped, (output, force), start, np.where(is_same, values, np.nan))
+        if complete is None:
+            return None
+        values = complete
+        outputs, inputs = np.tile(output, (len(values), 1)), np.tile(force, (len(values), 1))
     roots, exact = damped.roots(outputs, inputs, values)
     return roots if exact.all() else None
+
+
+def _repelled(
+    damped: PoleForm, rows: tuple[FloatArray, FloatArray], start: ComplexArray, known: ComplexArray
+) -> ComplexArray | None:
+    """All zeros with an imaginary part of at least 0, from some that are known; None where not each is found once."""
+    on_axis = np.abs(start.imag) <= REAL * np.abs(start)  # such a start stands for itself alone, the others for a pair
+    is_open = np.isnan(known) | (on_axis != (np.abs(known.imag) <= REAL * np.abs(known)))
+    fixed, begin = (
+        np.concatenate([numbers[chosen], numbers[chosen & ~on_axis].conj()])
+        for numbers, chosen in ((known, ~is_open), (start, is_open))
+    )
+    numerator = _Numerator.of(damped, *rows)
+    repelled = numerator.zeros_beside(fixed, begin)
+    if repelled is None:
+        return None
+    outputs, inputs = (np.tile(row, (len(repelled), 1)) for row in rows)
+    repelled, is_found = damped.zeros(outputs, inputs, repelled)
+    every = np.concatenate([fixed, repelled])
+    upper = np.concatenate(
+        [every[every.imag > REAL * np.abs(every)], every[np.abs(every.imag) <= REAL * np.abs(every)]]
+    )
+    is_closed = 2 * len(upper) - np.count_nonzero(np.abs(upper.imag) <= REAL * np.abs(upper)) == len(every)
+    return upper if is_found.all() and is_closed and not _merge(every) and numerator.has_all(every) else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Numerator:
+    """Numerator of an FRF, as the FRF times the factors of its poles."""
+
+    residues: ComplexArray
+    double: float
+    poles: ComplexArray
+
+    @classmethod
+    def of(cls, damped: PoleForm, output: FloatArray, force: FloatArray) -> _Numerator:
+        residues = (output @ damped.shapes) * (force @ damped.shapes) / damped.slope
+        double = float((output @ damped.rigid) @ (force @ damped.rigid))
+        return cls(residues=np.asarray(residues, complex), double=double, poles=np.asarray(damped.poles, complex))
+
+    def logarithmic_slope(self, z: ComplexArray) -> ComplexArray:
+        fractions = 1 / (z[:, None] - self.poles)
+        value, slope = fractions @ self.residues, -(fractions**2 @ self.residues)
+        result = fractions.sum(axis=1)
+        if self.double:
+            value, slope, result = value + self.double / z**2, slope - 2 * self.double / z**3, result + 2 / z
+        return np.asarray(result + slope / value)
+
+    def zeros_beside(self, fixed: ComplexArray, start: ComplexArray) -> ComplexArray | None:
+        """Newton's method on the numerator without the factors of all other zeros [Aberth1973]."""
+        # starts that are symmetric would stay so, and a pair never become two real zeros
+        values: ComplexArray = start * (1 + CLOSE * np.exp(2j * np.pi * GOLDEN * np.arange(len(start))))
+        for _ in range(REPULSIONS):
+            others = values[:, None] - values + np.where(np.eye(len(values), dtype=bool), np.inf, 0.0)
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # a step from a pole is not finite
+                repulsion = (1 / (values[:, None] - fixed)).sum(axis=1) + (1 / others).sum(axis=1)
+                step = 1 / (self.logarithmic_slope(values) - repulsion)
+            if not np.isfinite(step).all():
+                return None
+            values = np.asarray(values - step)
+            if (np.abs(step) <= MERGED * np.abs(values)).all():
+                return values
+        return None
+
+    def has_all(self, zeros: ComplexArray) -> bool:
+        """Tell whether these zeros, and no more, add up to the logarithmic slope at another place."""
+        probe = np.array([np.median(np.abs(self.poles)) * np.exp(0.25j * np.pi)])
+        parts = 1 / (probe - zeros)
+        missing = self.logarithmic_slope(probe)[0] - parts.sum()
+        return bool(np.abs(missing) <= SMALL_RESIDUE * np.abs(parts).sum())
 
 
 def _undamped_zeros(form: PoleForm, output: FloatArray, force: FloatArray) -> ComplexArray | None:
@@ -414,5 +551,11 @@ def _undamped_zeros(form: PoleForm, output: FloatArray, force: FloatArray) -> Co
 
 
 def _merge(values: ComplexArray) -> bool:
+    return bool(np.any(_gaps(values) < MERGED))
+
+
+def _gaps(values: ComplexArray) -> FloatArray:
+    """Distance of each from the nearest other one, over its modulus."""
     distance = np.abs(values[:, None] - values) + np.where(np.eye(len(values), dtype=bool), np.inf, 0.0)
-    return bool(np.any(distance.min(axis=1, initial=np.inf) < MERGED * np.abs(values)))
+    with np.errstate(divide="ignore"):  # two at 0 are one
+        return np.asarray(distance.min(axis=1, initial=np.inf) / np.abs(values))

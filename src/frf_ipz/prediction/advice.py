@@ -188,9 +188,12 @@ def _advice(
     """Say what would narrow a band most, and by how much; nothing where nothing does."""
     before = float(np.sqrt(np.mean(deviations**2)))
     best, advice = before, ""
-    for text, output, force in _candidates(updated_model, measured, predicted):
-        rows = updated_model.row(output), updated_model.row(force)
-        after = _remaining_deviation(deviations, ensemble.amplitudes(*rows, _observed_modes(ensemble)))
+    candidates = _candidates(updated_model, measured, predicted)
+    places = {dof: place for place, dof in enumerate({dof: None for _, *ends in candidates for dof in ends})}
+    rows = np.array([updated_model.row(dof) for dof in places]).reshape(-1, len(updated_model.dofs))
+    motions = rows @ ensemble.modes[1][:, :, : _observed_modes(ensemble)]
+    for text, output, force in candidates:
+        after = _remaining_deviation(deviations, motions[:, places[output]] * motions[:, places[force]])
         if after < best:
             best, advice = after, text
     if not advice or best > 0.9 * before:

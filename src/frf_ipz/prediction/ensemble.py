@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.numerics.damped_modes import damped_modes
+from frf_ipz.numerics.pole_sums import PoleSums
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,12 +21,12 @@ SOFT = 1e-3  # of the lowest line: frequency given to rigid-body modes, whose do
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ModelEnsemble:
-    """ModelEnsemble of an ensemble, in modes.
+    """An ensemble of models in modes.
 
     Parameters
     ----------
     matrices : (m, 3, r, r) array
-        Mass, damping and stiffness of each.
+        Mass, damping and stiffness of each, symmetric.
     lowest_rad_s : float
         Lowest frequency at which FRFs are evaluated.
     """
@@ -41,19 +43,14 @@ class ModelEnsemble:
         return np.maximum(values, (SOFT * self.lowest_rad_s) ** 2), lower.swapaxes(1, 2) @ vectors
 
     @cached_property
-    def roots(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Poles (m, 2 r), and right and left vectors (m, r, 2 r) whose product is the receptance's residue."""
+    def roots(self) -> list[tuple[ComplexArray, ComplexArray, ComplexArray]]:
+        """Of each member k poles, and right and left vectors (r, k) whose product is the receptance's residue.
+
+        Conjugates are left out; the vectors of real poles are halved, so that each sum with its conjugate is whole.
+        """
         squares, shapes = self.modes
-        count, order = squares.shape
-        damping = shapes.swapaxes(1, 2) @ self.matrices[:, 1] @ shapes
-        state = np.zeros((count, 2 * order, 2 * order))
-        state[:, :order, order:] = np.eye(order)
-        diagonal = np.arange(order)
-        state[:, order + diagonal, diagonal] = -squares
-        state[:, order:, order:] = -damping
-        poles, vectors = np.linalg.eig(state)
-        left_vectors = shapes @ np.linalg.inv(vectors)[:, :, order:].swapaxes(1, 2)
-        return poles.astype(complex), (shapes @ vectors[:, :order]).astype(complex), left_vectors.astype(complex)
+        rates = shapes.swapaxes(1, 2) @ self.matrices[:, 1] @ shapes
+        return [_roots(*member) for member in zip(squares, shapes, rates, strict=True)]
 
     def receptance(self, output: FloatArray, force: FloatArray, s: ComplexArray) -> ComplexArray:
         """Evaluate one FRF of every member.
@@ -70,9 +67,8 @@ class ModelEnsemble:
         (m, n_lines) complex array
             m/N.
         """
-        poles, right_vectors, left_vectors = self.roots
-        residues = (output @ right_vectors) * (force @ left_vectors)
-        return np.stack([(1 / (s[:, None] - p)) @ residue for p, residue in zip(poles, residues, strict=True)])
+        blocks = self.receptances(output[None], force[None], s)
+        return np.concatenate([block[:, :, 0] for _, _, block in blocks], axis=1)
 
     def receptances(
         self, outputs: FloatArray, forces: FloatArray, s: ComplexArray
@@ -91,14 +87,17 @@ class ModelEnsemble:
         slice, slice, (m, lines, frfs) complex array
             Lines, FRFs, and their values, m/N.
         """
-        poles, right_vectors, left_vectors = self.roots
+        sums = PoleSums.over([poles for poles, _, _ in self.roots], s)
         for first_frf in range(0, len(outputs), FRFS_AT_ONCE):
             frfs = slice(first_frf, first_frf + FRFS_AT_ONCE)
-            residues = (outputs[frfs] @ right_vectors) * (forces[frfs] @ left_vectors)
+            residues = [(right.T @ outputs[frfs].T) * (left.T @ forces[frfs].T) for _, right, left in self.roots]
+            terms = [sums.terms(member, of_member) for member, of_member in enumerate(residues)]
             for first_line in range(0, len(s), LINES_AT_ONCE):
                 lines = slice(first_line, first_line + LINES_AT_ONCE)
-                values = [(1 / (s[lines, None] - p)) @ residue.T for p, residue in zip(poles, residues, strict=True)]
-                yield lines, frfs, np.stack(values)
+                values = np.empty((len(terms), len(s[lines]), len(outputs[frfs])), complex)
+                for member, of_member in enumerate(terms):
+                    np.matmul(sums.factors(member, lines), of_member, out=values[member])
+                yield lines, frfs, values
 
     def amplitudes(self, output: FloatArray, force: FloatArray, count: int) -> FloatArray:
         """Mass-normalised products of shapes at sensor and excitation.
@@ -117,3 +116,12 @@ class ModelEnsemble:
         """
         shapes = self.modes[1][:, :, :count]
         return np.asarray((output @ shapes) * (force @ shapes))
+
+
+def _roots(
+    squares: FloatArray, shapes: FloatArray, rates: FloatArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    poles, vectors = damped_modes(squares, (rates + rates.T) / 2)
+    slope = 2 * poles * np.sum(vectors**2, axis=0) + np.sum(vectors * (rates @ vectors), axis=0)
+    right = shapes @ vectors
+    return poles, right, right / np.where(poles.imag > 0, slope, 2 * slope)

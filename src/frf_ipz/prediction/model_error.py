@@ -95,8 +95,10 @@ def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEn
     values = {(lines.start, frfs.start): block[0] for lines, frfs, block in centre.receptances(outputs, inputs, s)}
     for lines, frfs, block in ensemble.receptances(outputs, inputs, s):
         factor = s[lines, None] ** powers[frfs]
-        drawn = np.stack([scale.drawn(label, len(block)) for label in fit.labels[frfs]], axis=1)[:, None]
-        spread = np.var(block * factor * drawn, axis=0)
+        block *= np.stack([scale.drawn(label, len(block)) for label in fit.labels[frfs]], axis=1)[:, None]
+        block -= block.mean(axis=0)
+        parts = block.view(float).reshape(*block.shape, 2)
+        spread = np.einsum("mlfp,mlfp->lf", parts, parts) / len(block) * np.abs(factor) ** 2
         std = [np.interp(lines_hz[lines], fit.frequency_hz, column) for column in fit.value_std[:, frfs].T]
         noise = (np.stack(std, axis=1) / gains[frfs]) ** 2
         missed = measured[lines, frfs] - values[lines.start, frfs.start] * factor
@@ -165,7 +167,7 @@ def frf_sizes(updated: UpdatedModel, labels: Sequence[FrfLabel], s: ComplexArray
         In the unit of the FRF; no less than its modulus.
     """
     squares, shapes = centre.modes[0][0], centre.modes[1][0]
-    damping = np.einsum("ir,ij,jr->r", shapes, updated.model.damping, shapes)
+    damping = np.sum(shapes * (updated.model.damping @ shapes), axis=0)
     outputs, inputs = frf_rows(updated, labels)
     products = np.abs((outputs @ shapes) * (inputs @ shapes))
     powers = np.array([label.quantity.power for label in labels])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.numerics.pole_forms import are_symmetric, damped_form, every_damped_zero
+from frf_ipz.numerics.pole_forms import DampedModel, every_damped_zero
 from frf_ipz.pairing.model_roots import ModelZeros, model_zeros
 from frf_ipz.rational import ZeroSet
 
@@ -110,14 +110,19 @@ def _nearest_of_members(
         return nearest
     for member, (mass, damping, stiffness) in enumerate(ensemble):
         is_near, zeros = np.zeros(len(start), bool), start
-        if are_symmetric(mass, damping, stiffness):
-            zeros, is_found = damped_form(mass, damping, stiffness).zeros(outputs[frf], inputs[frf], start)
+        by_poles = DampedModel.of(mass, damping, stiffness)
+        if by_poles is not None:
+            zeros, is_found = by_poles.damped.zeros(outputs[frf], inputs[frf], start)
             is_near = is_found & (np.abs(zeros - start) < HALFWAY * gaps)
         # where none of an FRF has come halfway to another, each is still the nearest
         far = np.unique(frf[~is_near])
         for number in np.setdiff1d(frf, far).tolist():
             nearest[number][member] = _if_same(zeros[frf == number], found[number].values)
-        every_zero = every_damped_zero(mass, damping, stiffness, outputs[far], inputs[far])
+        every_zero = (
+            every_damped_zero(mass, damping, stiffness, outputs[far], inputs[far])
+            if by_poles is None
+            else by_poles.every_zero(outputs[far], inputs[far])
+        )
         for number, every in zip(far.tolist(), every_zero, strict=True):
             upper, values = every.values[every.values.imag > 0], found[number].values
             if len(upper):

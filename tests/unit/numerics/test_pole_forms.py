@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from frf_ipz.numerics import pole_forms
 from frf_ipz.numerics.pencils import damped_zeros, undamped_zeros
 from frf_ipz.numerics.pole_forms import damped_form, every_damped_zero, every_undamped_zero, undamped_form
 
@@ -112,6 +113,25 @@ def test_zeros_of_two_modes_that_are_one_are_left_to_the_pencil(rows):
     assert_allclose(
         np.sort_complex(found.values), np.sort_complex(undamped_zeros(mass, stiffness, *rows[:, :3]).values), rtol=1e-9
     )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_zeros_that_damping_moves_far_are_found_without_the_pencil(rows, monkeypatch, seed):
+    """Zeros far from the axis meet and part again: each repels the others on its way."""
+    model = matrices(seed, dashpot=3e3)
+    expected = upper_of(damped_zeros(*model, *rows).values)
+    monkeypatch.setattr(pole_forms, "_by_pencil", None)
+    (found,) = every_damped_zero(*model, rows[:1], rows[1:])
+    assert_allclose(upper_of(found.values), expected, rtol=1e-7)
+
+
+def test_zeros_that_are_not_all_are_told_from_all(rows):
+    mass, damping, stiffness = matrices(dashpot=3e4)
+    numerator = pole_forms._Numerator.of(damped_form(mass, damping, stiffness), *rows)
+    every = damped_zeros(mass, damping, stiffness, *rows).values
+    assert numerator.has_all(every)
+    assert not numerator.has_all(every[1:])
+    assert not numerator.has_all(np.append(every[1:], every[1] * 1.01))
 
 
 def test_matrices_that_are_not_symmetric_are_taken_too(rows):

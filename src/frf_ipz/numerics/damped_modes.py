@@ -1,0 +1,93 @@
+"""Poles and shapes of a lightly damped model in the modes of the undamped one.
+
+In those modes ``(p^2 I + p C + diag(w^2)) x = 0``, where C is nearly diagonal. Row by row that is a fixed point, which
+is reached by a few products of matrices: Jacobi's method, with the own component of each mode held at 1. Its result is
+that of the eigenvalue problem of twice the order to rounding, or the eigenvalue problem is solved: of modes so close
+that damping mixes them, of heavy damping, and of so few modes that it costs no more.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from frf_ipz.arrays import ComplexArray, FloatArray
+
+STEPS = 80  # of the iteration: of the few modes that take so many, the work is below that of the eigenvalue problem
+FEW = 16  # modes, up to which the eigenvalue problem costs less
+ROUNDING = 64 * np.finfo(float).eps  # relative step from which a mode counts as found
+COUPLED = 1e-9  # relative coupling of two modes that were found: they are not orthogonal, so one was found twice
+
+
+def damped_modes(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Poles and their vectors without the conjugates.
+
+    Parameters
+    ----------
+    squares : (n,) array
+        Squared natural frequencies without damping, (rad/s)^2.
+    rates : (n, n) array
+        Damping in mass-normalised modes, rad/s.
+
+    Returns
+    -------
+    poles : (k,) array
+        Those with an imaginary part above 0, then the real ones, rad/s.
+    vectors : (n, k) array
+        In the undamped modes.
+    """
+    found = _from_undamped(squares, rates) if len(squares) > FEW else None
+    return _by_eigenvalues(squares, rates) if found is None else found
+
+
+def _from_undamped(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, ComplexArray] | None:
+    """Iterate; None where it does not end at as many different modes."""
+    own_rates = np.diag(rates)
+    if not (squares > own_rates**2 / 4).all() or not np.array_equal(rates, rates.T):
+        return None
+    coupling = rates - np.diag(own_rates)
+    order = len(squares)
+    poles, vectors = np.zeros(order, complex), np.eye(order, dtype=complex)
+    columns, moving = np.arange(order), vectors
+    for _ in range(STEPS):
+        forces = (coupling @ moving.view(float)).view(complex)
+        own = columns, np.arange(len(columns))
+        half = (own_rates[columns] + forces[own]) / 2
+        root = np.sqrt(half**2 - squares[columns])
+        latest = np.where(root.imag < 0, -root, root) - half
+        stiffnesses = latest * (latest + own_rates[:, None]) + squares[:, None]
+        stiffnesses[own] = 1.0
+        forces *= -latest
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of two modes that are one there is no end
+            forces /= stiffnesses
+            forces[own] = 1.0
+            steps = np.abs((forces - moving).view(float)).max(axis=0).reshape(-1, 2).max(axis=1)
+        vectors[:, columns], poles[columns] = forces, latest
+        is_open = ~(steps <= ROUNDING)
+        if not is_open.any():
+            break
+        columns, moving = columns[is_open], np.ascontiguousarray(forces[:, is_open])
+    else:
+        return None
+    return (poles, vectors) if (poles.imag > 0).all() and _are_different(poles, vectors, rates) else None
+
+
+def _are_different(poles: ComplexArray, vectors: ComplexArray, rates: FloatArray) -> bool:
+    inertial = vectors.T @ vectors
+    damped = vectors.T @ (rates @ vectors.view(float)).view(complex)
+    products = np.abs((poles[:, None] + poles) * inertial + damped)
+    slopes = np.diag(products)
+    off = products - np.diag(slopes)
+    return bool((off <= COUPLED * np.sqrt(slopes[:, None] * slopes)).all())
+
+
+def _by_eigenvalues(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    count = len(squares)
+    top = max(float(np.abs(squares).max(initial=0.0)), np.finfo(float).tiny)
+    scale = np.sqrt(top)
+    state = np.zeros((2 * count, 2 * count))
+    state[:count, count:] = np.eye(count)
+    state[count:, :count] = np.diag(-squares / top)
+    state[count:, count:] = -rates / scale
+    values, vectors = np.linalg.eig(state)
+    chosen = np.concatenate([np.flatnonzero(values.imag > 0), np.flatnonzero(values.imag == 0)])
+    return values[chosen].astype(complex) * scale, vectors[:count, chosen].astype(complex)

@@ -1,0 +1,53 @@
+"""Poles and shapes of a damped model in undamped modes, against the eigenvalue problem of twice the order."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from frf_ipz.numerics import damped_modes as module
+from frf_ipz.numerics.damped_modes import damped_modes
+
+ORDER = 40
+
+
+def model(*, coupling, closest=1.0, seed=0):
+    rng = np.random.default_rng(seed)
+    omega = 100.0 * np.arange(1, ORDER + 1)
+    omega[11] = omega[10] * (1 + 0.1 * closest)
+    shared = rng.standard_normal((ORDER, ORDER))
+    return omega**2, np.diag(0.01 * omega) + coupling * (shared + shared.T)
+
+
+def residual(squares, rates, poles, vectors):
+    forces = poles**2 * vectors + poles * (rates @ vectors) + squares[:, None] * vectors
+    return np.abs(forces).max(axis=0) / np.abs(squares[:, None] * vectors).max(axis=0)
+
+
+@pytest.mark.parametrize(("coupling", "closest"), [(0.0, 1.0), (0.3, 1.0), (0.3, 1e-3), (0.3, 0.0), (30.0, 1.0)])
+def test_poles_are_those_of_the_eigenvalue_problem(coupling, closest):
+    squares, rates = model(coupling=coupling, closest=closest)
+    poles, vectors = damped_modes(squares, rates)
+    expected, _ = module._by_eigenvalues(squares, rates)
+    assert_allclose(np.sort_complex(poles), np.sort_complex(expected), rtol=1e-10)
+    assert residual(squares, rates, poles, vectors).max() < 1e-10
+
+
+def test_lightly_coupled_modes_need_no_eigenvalue_problem(monkeypatch):
+    squares, rates = model(coupling=0.3)
+    monkeypatch.setattr(module, "_by_eigenvalues", None)
+    assert len(damped_modes(squares, rates)[0]) == ORDER
+
+
+def test_a_mode_that_is_found_twice_is_refused():
+    squares, rates = model(coupling=0.3)
+    poles, vectors = damped_modes(squares, rates)
+    assert module._are_different(poles, vectors, rates)
+    assert not module._are_different(poles[[0, 0]], np.ascontiguousarray(vectors[:, [0, 0]]), rates)
+
+
+def test_an_overdamped_mode_has_two_real_poles():
+    squares, rates = model(coupling=0.0)
+    rates[0, 0] = 4 * np.sqrt(squares[0])
+    poles, _ = damped_modes(squares, rates)
+    assert len(poles) == ORDER + 1
+    assert np.count_nonzero(poles.imag == 0) == 2
