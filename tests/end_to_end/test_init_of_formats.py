@@ -1,5 +1,6 @@
 """From a folder of recordings or FRFs in any format, by init, check and run, to a page, without an editor."""
 
+import re
 import sys
 
 import h5py
@@ -196,6 +197,21 @@ def test_frfs_in_any_format(tmp_path, name, write, n_frfs):
     np.testing.assert_allclose(frfs.values[:, 0], FRF, rtol=1e-10)
     if n_frfs == 1:
         assert str(test.labels[0]) == "21:+z / 15:+z"
+
+
+def test_frfs_without_a_header_are_guessed_and_their_single_numbers_are_those_of_a_roving_hammer(tmp_path):
+    for point, values in enumerate((FRF, 2 * FRF), start=1):
+        table = np.column_stack([np.arange(400.0), values.real[:400], values.imag[:400]])
+        table[0, 2] = 0.0
+        np.savetxt(tmp_path / f"Point_{point}.txt", table, fmt="%.6e", delimiter="\t")
+    np.savetxt(tmp_path / "counted.txt", np.arange(60.0).reshape(20, 3) % 7)
+    starting = write_starting_files(tmp_path)
+    text = (tmp_path / "test.toml").read_text(encoding="utf-8")
+    assert re.search(r'columns = \["frequency_hz", "real", "imag"\] .*CHECK', text)
+    assert any(note.startswith("counted.txt: left out") for note in starting.taken_for)
+    frfs = frf_ipz.estimate_frfs(read_test(tmp_path / "test.toml")).frfs
+    assert [str(label) for label in frfs.labels] == ["1:+z / 1:+z", "1:+z / 2:+z"]
+    np.testing.assert_allclose(frfs.values[1:, 1], 2 * FRF[1:400], rtol=1e-5)
 
 
 def test_what_is_no_measurement_is_left_aside(tmp_path):

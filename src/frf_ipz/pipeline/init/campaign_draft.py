@@ -11,6 +11,7 @@ from frf_ipz.ingest.formats.registry import look_at_frfs
 from frf_ipz.ingest.units import frf_factor
 from frf_ipz.pipeline.init.columns import UNITS, quantity_of, read_columns
 from frf_ipz.pipeline.init.excitation import excitation
+from frf_ipz.pipeline.init.folder_contents import BARE_FRF, is_bare_frf
 from frf_ipz.pipeline.init.text import HEAD, guessed, quoted, with_comment
 from frf_ipz.quantities import FrfQuantity
 
@@ -153,7 +154,9 @@ def _frf_test(contents: FolderContents, places: Places) -> str:
         for name in found.arrays or ("",):
             lines += ["", "[[frf]]", f"file = {quoted(contents.name(path))}"]
             lines += [f"variables = {{ frf = {quoted(name)} }}"] if name else []
-            lines += _frf_keys(path, found, places, taken)
+            lines += _frf_keys(path, found, places, taken, is_roving=len(contents.frfs) > 1)
+            if is_bare_frf(path):
+                lines.append(guessed(f"columns = {_listed(list(BARE_FRF))}", "the file names none"))
     return "\n".join(lines) + "\n"
 
 
@@ -164,7 +167,9 @@ def _modes_test(contents: FolderContents) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _frf_keys(path: Path, found: FrfContents, places: Places, taken: set[tuple[str, str]]) -> list[str]:
+def _frf_keys(
+    path: Path, found: FrfContents, places: Places, taken: set[tuple[str, str]], *, is_roving: bool
+) -> list[str]:
     """Say what FRFs are and connect; what the file does not say is guessed."""
     quantity = found.quantity or _quantity_of(found.unit)
     name = quantity.value if quantity is not None else FrfQuantity.ACCELERANCE.value
@@ -175,7 +180,7 @@ def _frf_keys(path: Path, found: FrfContents, places: Places, taken: set[tuple[s
     if found.lacks_directions:
         lines.append(guessed('direction = "z"', "of the nodes, which have none in the file"))
     elif not found.ends:
-        outputs, inputs = _guess_ends(path, found, places, taken)
+        outputs, inputs = _guess_ends(path, found, places, taken, is_roving=is_roving)
         taken |= {(output, input_) for output in outputs for input_ in inputs}
         lines.append(guessed(f"output_dof = {_listed(outputs)}", "of the sensors"))
         lines.append(guessed(f"input_dof = {_listed(inputs)}", "of the forces"))
@@ -183,15 +188,18 @@ def _frf_keys(path: Path, found: FrfContents, places: Places, taken: set[tuple[s
 
 
 def _guess_ends(
-    path: Path, found: FrfContents, places: Places, taken: set[tuple[str, str]]
+    path: Path, found: FrfContents, places: Places, taken: set[tuple[str, str]], *, is_roving: bool
 ) -> tuple[list[str], list[str]]:
-    """Guess what FRFs connect: as the file's name says where it is one FRF, and no pair twice."""
+    """Guess what FRFs connect: as the file's name says where it is one FRF, and no pair twice.
+
+    A single number in the names of several files is that of a hammer that roves, with one sensor.
+    """
     nodes = [int(number) for number in NODE.findall(path.stem)]
     struck = places.of_impact(nodes[-1] if nodes else 1)
     if not found.n_outputs == found.n_inputs == 1:
         outputs = [places.of_sensor(number) for number in range(1, found.n_outputs + 1)]
         return outputs, [places.of_impact(number) for number in range(1, found.n_inputs + 1)]
-    first = places.of_impact(nodes[0]) if len(nodes) > 1 else struck
+    first = places.of_impact(nodes[0]) if len(nodes) > 1 else places.of_sensor(1) if is_roving else struck
     candidates = [first, *(places.of_sensor(number) for number in range(1, len(taken) + 2))]
     return [next((output for output in candidates if (output, struck) not in taken), first)], [struck]
 

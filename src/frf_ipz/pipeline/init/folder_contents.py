@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from frf_ipz.errors import FileFormatError, InputError
@@ -12,6 +13,7 @@ from frf_ipz.ingest.formats.modes_uff import holds_shapes
 from frf_ipz.ingest.formats.registry import is_known_recording, look_at_frfs, look_at_recording
 from frf_ipz.ingest.formats.text_layout import sniff
 from frf_ipz.quantities import FrfQuantity
+from frf_ipz.text_numbers import NumberError, parse_number
 
 MODES_COLUMNS = frozenset({"mode", "frequency_hz", "damping_ratio", "dof", "real"})
 CSV = ".csv"
@@ -21,8 +23,9 @@ DECKS = (".sti", ".mas", ".dof", ".full", ".inp", ".bdf", ".op4", ".op2", ".asm"
 ARRAYS = (".npz", ".npy")  # matrices where they are called so, else recordings or FRFs
 UNTIMED = (
     "is a table without a column of time that grows by equal steps; where it is a recording, call it .csv, and write "
-    "sample_rate_hz under [test]"
+    "sample_rate_hz under [test]; where it is an FRF, say 'columns' in an [[frf]]"
 )
+BARE_FRF = ("frequency_hz", "real", "imag")  # columns of a table without names, as CutPro writes it
 FEWEST_ROWS = 16  # of a recording
 DOF_COLUMNS = frozenset({"node", "direction"})
 UNIVERSAL = (".unv", ".uff")
@@ -150,7 +153,7 @@ def _kind(path: Path) -> str:
     is_known = is_known_recording(path)
     if not is_known and path.suffix.lower() not in {CSV, *TEXT} and not _holds_frfs(path):
         return ""
-    if _holds_frfs(path):
+    if _holds_frfs(path) or (not is_known and is_bare_frf(path)):
         return "frf"
     if not is_known and path.suffix.lower() != CSV and not _is_table(path):
         return ""
@@ -166,6 +169,30 @@ def _holds_frfs(path: Path) -> bool:
         return look_at_frfs(FrfSource(path=path, quantity=FrfQuantity.ACCELERANCE)) is not None
     except FileFormatError:  # a file that might, and does not
         return False
+
+
+def is_bare_frf(path: Path) -> bool:
+    """Tell whether a table without names looks like frequency, real and imaginary part of an FRF.
+
+    Parameters
+    ----------
+    path : Path
+        A file.
+
+    Returns
+    -------
+    bool
+        True where lines go from 0 by whole numbers, and the last of three columns is 0 at 0 Hz, as a spectrum's is.
+    """
+    try:
+        layout = sniff(path)
+        rows = [[parse_number(text, decimal=layout.decimal) for text in row] for row in layout.rows]
+    except (FileFormatError, NumberError):
+        return False
+    if layout.header or layout.n_columns != len(BARE_FRF) or len(rows) < 3 or len({len(row) for row in rows}) != 1:
+        return False
+    steps = {later[0] - row[0] for row, later in pairwise(rows)}
+    return rows[0][0] == rows[0][2] == 0.0 and len(steps) == 1 and min(steps) >= 1.0 and min(steps).is_integer()
 
 
 def _is_table(path: Path) -> bool:
