@@ -6,6 +6,14 @@ system is a quotient of two short polynomials, the same for all records, and the
 over the same denominator, different in each record (the local rational method of [McKelveyGuerin2012]). The misfit is
 compared with the noise of the channels and with a small part of the response.
 
+Under the exponential window of impacts noise is nearly the same on neighbouring lines, and so is that of the force in
+the few milliseconds of its gate: the lines of a group hold few independent numbers, whose mean may exceed any fixed
+limit by chance. How far it may is computed from the covariance of the lines (three cumulants of a sum of exponential
+variables, [Buckley1988]), for all groups of a test together. The statistic stays the plain mean: a law bends the FRF
+as smoothly as such noise does, and weights that suppress the noise would suppress the law.
+
+[Buckley1988] M. J. Buckley and G. K. Eagleson, An approximation to the distribution of quadratic forms in normal random
+variables, Australian Journal of Statistics 30A, 1988, doi:10.1111/j.1467-842X.1988.tb00471.x.
 [McKelveyGuerin2012] T. McKelvey and G. Guerin, Non-parametric frequency response estimation using a local rational
 model, IFAC Proceedings 45(16), 2012, doi:10.3182/20120711-3-BE-2027.00299.
 """
@@ -16,6 +24,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import gammainccinv
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.measured.contour import WINDOW_DECAYS
@@ -38,6 +47,7 @@ END = 10  # part of a record at its end that shows the residual motion for the n
 CUT = 1e-12  # of the largest singular value of the local polynomials
 LEAKAGE = 2.0  # lines beside its own on which a tone shows
 LIMIT_HAMMER, LIMIT_SHAKER = 5.0, 2.0  # times the expected misfit, in the worst group of lines
+CHANCE = 1e-3  # that a whole linear test exceeds the limit by its noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,7 +57,8 @@ class Linearity:
     Parameters
     ----------
     score : float
-        Largest misfit of all groups of lines over the one expected by noise; about 1 or less for a linear system.
+        Largest misfit of all groups of lines over the one expected by noise; about 1 or less for a linear system. Where
+        chance alone may exceed the limit, the limit times the misfit over what chance may reach.
     limit : float
         Above it, the system is not linear, or changed between the records.
     frequency_hz : (n_groups,) array
@@ -82,10 +93,12 @@ def assess_linearity(observations: Observations) -> Linearity:
     """
     noise = read_noise(observations)
     parts = [_assess_group(observations, records, noise) for records in group_records(observations)]
-    frequency, misfit = (np.concatenate(values) for values in zip(*parts, strict=True))
+    frequency, misfit, spread = (np.concatenate(values) for values in zip(*parts, strict=True))
+    limit = LIMIT_HAMMER if noise.is_hammer else LIMIT_SHAKER
+    by_chance = largest_mean(spread, CHANCE / max(misfit.size, 1))
     return Linearity(
-        score=float(misfit.max(initial=0.0)),
-        limit=LIMIT_HAMMER if noise.is_hammer else LIMIT_SHAKER,
+        score=float((misfit * limit / np.maximum(by_chance, limit)).max(initial=0.0)),
+        limit=limit,
         frequency_hz=frequency,
         misfit=misfit,
     )
@@ -93,16 +106,17 @@ def assess_linearity(observations: Observations) -> Linearity:
 
 def _assess_group(
     observations: Observations, records: tuple[ObservedRecord, ...], noise: ChannelNoise
-) -> tuple[FloatArray, FloatArray]:
-    """Middles of groups of lines, and misfits (n_groups, n_sensors)."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Middles of groups of lines, misfits (n_groups, n_sensors), and their cumulants (n_groups, n_sensors, 2)."""
     n, step = min(record.n_samples for record in records), records[0].step_s
     frequency = np.asarray(np.fft.rfftfreq(n, step), float)
     included = observations.mask_band(frequency, LEAKAGE / (n * step)) & (len(records) >= MIN_RECORDS)
     used, n_groups = _group_lines(np.flatnonzero(included))
     middle = frequency[used].reshape(n_groups, WIDTH).mean(1)
     misfit = np.zeros((n_groups, len(noise.sensors)))
+    cumulants = np.zeros((*misfit.shape, 2))
     if not n_groups:
-        return middle, misfit
+        return middle, misfit, cumulants
     sigma = WINDOW_DECAYS / (n * step) if noise.is_hammer else 0.0
     lines = [_transform(record, noise, n, sigma)[:, used] for record in records]
     length = (1 - np.exp(-2 * WINDOW_DECAYS)) / (2 * sigma) if sigma else n * step
@@ -113,19 +127,79 @@ def _assess_group(
         ]
     )
     by_force = MeasuredNoise(channel=records[0].input_channel).scales(records)[:, None]
-    of_force = noise.force_energy(frequency[used], n * step) * by_force + missing[:, :1]
+    of_force = noise.force_energy(frequency[used], n * step) * by_force
+    s = np.asarray(sigma + 2j * np.pi * np.arange(WIDTH) / (n * step), np.complex128)
+    durations_s = (noise.pulse_s, n * step) if noise.is_hammer else ()
+    correlation = np.array([decaying_correlation(s, duration_s) for duration_s in durations_s])
     for row, sensor in enumerate(records[0].sensors):
         column = noise.sensors.index((sensor.channel, sensor.dof))
         by_record = MeasuredNoise(channel=sensor.channel).scales(records)[:, None]
-        of_response = noise.response_energy(column, frequency[used], length) * by_record + missing[:, [1 + row]]
-        of_response = of_response + _residual_motion_energy(records, row, frequency[used], sigma)
-        energies = np.array([of_force, of_response])
+        of_response = noise.response_energy(column, frequency[used], length) * by_record
+        stationary = np.array([of_force, of_response])
+        motion_before = _residual_motion_energy(records, row, frequency[used], sigma)
+        common = np.array([missing[:, :1] + np.zeros_like(of_force), missing[:, [1 + row]] + motion_before])
         for group in range(n_groups):
             part = slice(group * WIDTH, (group + 1) * WIDTH)
             force, motion = (np.array([line[i, part] for line in lines]) for i in (0, 1 + row))
-            relative_misfit = _frf_misfit if noise.is_hammer else _quotient_misfit
-            misfit[group, column] = relative_misfit(force, motion, energies[..., part])
-    return middle, misfit
+            if noise.is_hammer:
+                energies = stationary[..., part], common[..., part]
+                misfit[group, column], *cumulants[group, column] = _frf_misfit(force, motion, *energies, correlation)
+            else:
+                misfit[group, column] = _quotient_misfit(force, motion, (stationary + common)[..., part])
+    return middle, misfit, cumulants
+
+
+def decaying_correlation(s: ComplexArray, duration_s: float) -> ComplexArray:
+    """Compute the correlation of white noise on lines under an exponential window.
+
+    Parameters
+    ----------
+    s : (n_lines,) complex array
+        rad/s, the decay of the window as real part.
+    duration_s : float
+        From the beginning of the window on, the noise lasts so long.
+
+    Returns
+    -------
+    (n_lines, n_lines) complex array
+        1 on the diagonal.
+
+    Examples
+    --------
+    >>> lines = 8.0 + 2j * np.pi * np.arange(2)  # of one second
+    >>> [round(abs(decaying_correlation(lines, duration_s)[0, 1]), 2) for duration_s in (1.0, 0.01)]
+    [np.float64(0.93), np.float64(1.0)]
+    """
+    rate = s[:, None] + s[None, :].conj()
+    covariance = -np.expm1(-rate * duration_s) / rate
+    std = np.sqrt(np.diag(covariance).real)
+    return np.asarray(covariance / np.outer(std, std))
+
+
+def largest_mean(cumulants: FloatArray, probability: float) -> FloatArray:
+    """Compute what a mean of squared moduli, 1 if expected, exceeds with a probability, as in [Buckley1988].
+
+    Parameters
+    ----------
+    cumulants : (..., 2) array
+        Sums of the second and of the third powers of its parts, each an exponential variable.
+    probability : float
+        Of a larger mean.
+
+    Returns
+    -------
+    (...) array
+        1 where the parts are not known.
+
+    Examples
+    --------
+    >>> largest_mean(np.array([1.0, 1.0]), np.exp(-5.0)).round(2)  # a single exponential variable
+    np.float64(5.0)
+    """
+    second, third = np.moveaxis(cumulants, -1, 0)
+    scale = np.divide(third, second, out=np.zeros_like(third), where=second > 0)
+    shape = np.divide(second**3, third**2, out=np.ones_like(third), where=third > 0)
+    return np.asarray(1 + scale * (gammainccinv(shape, probability) - shape))
 
 
 def _missing_ringing_energy(record: ObservedRecord) -> FloatArray:
@@ -168,12 +242,44 @@ def _variance(motion: ComplexArray, frf: ComplexArray, energies: FloatArray) -> 
     return np.asarray(energies[1] + np.abs(frf) ** 2 * energies[0] + (MODEL_ERROR * np.abs(motion)) ** 2)
 
 
-def _frf_misfit(force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
-    """Misfit of one FRF for all records over the expected one; force and motion are (n_records, WIDTH)."""
+def _frf_misfit(
+    force: ComplexArray, motion: ComplexArray, stationary: FloatArray, common: FloatArray, correlation: ComplexArray
+) -> tuple[float, float, float]:
+    """Misfit of one FRF for all records over the expected one, and its second and third cumulant.
+
+    Parameters
+    ----------
+    force, motion : (n_records, WIDTH) complex array
+        Transforms.
+    stationary, common : (2, n_records, WIDTH) array
+        Energy, of force and response, of noise and of what is one number on all lines.
+    correlation : (2, WIDTH, WIDTH) complex array
+        Of the noise.
+
+    Returns
+    -------
+    misfit, second, third : float
+        1 is expected of the misfit.
+    """
+    energies = stationary + common
     frf = np.sum(motion * force.conj(), 0) / np.sum(np.abs(force) ** 2, 0)
     variance = _variance(motion, frf, energies)
-    frf = np.sum(motion * force.conj() / variance, 0) / np.sum(np.abs(force) ** 2 / variance, 0)
-    return float(np.sum(np.abs(motion - frf * force) ** 2 / variance) / (motion.size - motion.shape[1]))
+    weight = np.abs(force) ** 2 / variance
+    frf = np.sum(motion * force.conj() / variance, 0) / np.sum(weight, 0)
+    misfit = np.sum(np.abs(motion - frf * force) ** 2 / variance) / (motion.size - motion.shape[1])
+    std = np.sqrt(variance)
+    gains = np.array([np.broadcast_to(frf, motion.shape), np.ones_like(motion)]) / std
+    noises, shared = gains * np.sqrt(stationary), gains * np.sqrt(common)
+    # of each record: a record that determines the FRF alone has no misfit
+    part = np.sqrt(1 - weight / np.sum(weight, 0))
+    covariance = np.einsum("ri,rj,cri,crj,cij->ij", part, part, noises, noises.conj(), correlation)
+    covariance += np.einsum("ri,rj,cri,crj->ij", part, part, shared, shared.conj())
+    covariance[np.diag_indices_from(covariance)] = np.sum(part**2, 0)  # what else there is differs from line to line
+    covariance /= np.trace(covariance).real
+    square = covariance @ covariance
+    n_left = len(motion) - 1  # records that the FRF does not explain: each has the same covariance, or nearly so
+    second, third = np.trace(square).real / n_left, np.trace(square @ covariance).real / n_left**2
+    return float(misfit), float(second), float(third)
 
 
 def _quotient_misfit(force: ComplexArray, motion: ComplexArray, energies: FloatArray) -> float:
