@@ -132,13 +132,11 @@
 
   const logarithm = (value) => Math.log10(Math.max(value, page.lowestHz));
 
+  // Only FRFs that are shown are unpacked and handed over: hundreds that are not would take seconds.
   function traces(picture, before) {
-    return unpack(picture.data).map((trace, place) => {
-      const frf = trace.meta && trace.meta.frf;
-      if (frf !== undefined && hidden.has(frf)) return { ...trace, visible: false };
-      const isOff = before && before[place].visible === "legendonly"; // switched off in the legend
-      return isOff ? { ...trace, visible: "legendonly" } : trace;
-    });
+    const off = new Set((before || []).filter(({ visible }) => visible === "legendonly").map(({ uid }) => uid)); // in the legend
+    const named = picture.data.map((packed, place) => ({ packed, uid: `${place}` }));
+    return named.filter(({ packed }) => !hidden.has(packed.meta?.frf)).map(({ packed, uid }) => ({ ...unpack(packed), uid, ...(off.has(uid) && { visible: "legendonly" }) }));
   }
 
   // On a narrow screen a long legend takes half of a picture: it gets the height of another half.
