@@ -87,6 +87,7 @@ DISAGREEING = "weak and strong records disagree"
 NO_TIME_BESIDE_LAW = "a linear effect beside a force law"
 NOT_WITH_STATED_DAMPING = "effects that would explain the damping"
 NOT_UNNAMED = "forces that are not in the catalogue"
+NOT_DETECTABLE = "how small an effect of each kind would show"
 SEED_WARNING = "[diagnose] seed has no effect: nothing in a diagnosis is drawn at random; leave it out"
 
 
@@ -164,11 +165,10 @@ def diagnose(
     require_type("frfs", frfs, FrfSet, optional=True)
     require_type("options", options, DiagnoseOptions, optional=True)
     require_each("effects", effects, Effect, Law)
-    observations = _as_observations(data, frfs, ingest, fit)
     catalogue = EffectCatalogue(options=options or DiagnoseOptions(), folder=as_path(folder), own=tuple(effects))
-    return find_causes(
-        fe_model, observations, catalogue, deadline=Deadline(seconds=catalogue.options.seconds), progress=progress
-    )
+    deadline = Deadline(seconds=catalogue.options.seconds)
+    observations = _as_observations(data, frfs, ingest, fit)
+    return find_causes(fe_model, observations, catalogue, deadline=deadline, progress=progress)
 
 
 @on_one_thread
@@ -248,12 +248,15 @@ def _diagnose(
     is_clearly_nonlinear = excess > CLEARLY_NONLINEAR
     progress(0.2, "fitting the nominal model")
     nothing = decide_without_search(problem)
+    detectable_sizes = _find_detectable_sizes(problem, nothing, deadline)  # before a search uses up the time
     is_searched = bool(problem.effects) and not is_clearly_nonlinear
     is_searched &= not (only_where_they_differ and nothing.verdict == DiagnosisVerdict.CONSISTENT)
     found = _Found(problem=problem, decision=nothing, shortfall=_shortfall(nothing))
     if is_searched:
         found = _search(problem, nothing, pose_with, options, deadline, progress)
     problem, decision = found.problem, found.decision
+    if decision.null is not nothing.null:  # damping was freed: less shows
+        detectable_sizes = _find_detectable_sizes(problem, decision, deadline) or detectable_sizes
     progress(0.9, "proving on what was not fitted")
     held_out = make_data(source.held_out, options, free_gains=scale)
     decision, proof = _prove_and_prune(problem, held_out, decision)
@@ -264,7 +267,10 @@ def _diagnose(
         findings=_appearing(linear.findings) if found.shortfall else linear.findings,
         statements=(damping,) if damping else (),
         unexplained_part=found.shortfall,
-        not_searched=decision.not_searched,
+        not_searched="; ".join(
+            filter(None, [decision.not_searched, "" if detectable_sizes is not None else NOT_DETECTABLE])
+        ),
+        detectability=detectable_sizes or {},
         warnings=list_warnings(source, data_checks),
     )
     linear = replace(linear, statement=_write_statement(linear, decision, is_searched=is_searched))
@@ -337,7 +343,12 @@ def _search_with_free_damping(
 ) -> _Found | None:
     """Search with damping ratios as measured; None where that does not explain all."""
     problem = drop_damping_effects(pose_with(free_damping(options)))
-    decision = decide(replace(problem, deadline=deadline), progress, null=fit_null_model(problem))
+    limited = replace(problem, deadline=deadline)
+    try:
+        null = fit_null_model(limited)
+    except DeadlineError:
+        return None
+    decision = decide(limited, progress, null=null)
     if not decision.goodness.is_good:
         return None
     rest = decision.not_searched or (NOT_WITH_STATED_DAMPING if deadline.is_over else "")
@@ -368,6 +379,17 @@ def _refuse_implausible(limited: InferenceProblem, decision: Decision) -> _Found
 
 def _shortfall(decision: Decision) -> str:
     return decision.goodness.shortfall if decision.verdict == DiagnosisVerdict.UNEXPLAINED else ""
+
+
+def _find_detectable_sizes(
+    problem: InferenceProblem, decision: Decision, deadline: Deadline
+) -> dict[str, dict[str, float]] | None:
+    """Find how small an effect of each kind would show; None where there is no time for it."""
+    limited = replace(problem, deadline=deadline)
+    try:
+        return find_detectable_sizes(limited, decision.null, decision.null_goodness.required_log_bayes_factor)
+    except DeadlineError:
+        return None
 
 
 def _prove_and_prune(problem: InferenceProblem, held_out: Data, decision: Decision) -> tuple[Decision, Proof]:
@@ -408,7 +430,6 @@ def _make_linear_diagnosis(
         held_out_kind=held_out_kind,
         ambiguity=_find_ambiguity(problem, decision, ranked_effects),
         data_checks=data_checks,
-        detectability=find_detectable_sizes(problem, decision.null, decision.null_goodness.required_log_bayes_factor),
         curves=proof.curves,
         numbers=_collect_numbers(decision),
     )

@@ -1,11 +1,16 @@
 """A search ends when its time is over, keeps what it has, and says what it did not look at."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from diagnosed import BAND_HZ, beam, measured, observed
 from frf_ipz.diagnosis.deadline import Deadline, DeadlineError
 from frf_ipz.diagnosis.diagnose import find_causes
 from frf_ipz.diagnosis.effect_selection import EffectCatalogue
+from frf_ipz.diagnosis.evidence.inference_problem import pose_problem
+from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
 EFFECTS = ("added_mass",)
@@ -72,6 +77,22 @@ def test_a_search_without_time_says_what_it_did_not_look_at(search):
     assert diagnosis.not_searched in diagnosis.statement
     assert diagnosis.to_json()["complete"] is False
     assert looks < 10  # between one hypothesis and the next
+
+
+def test_a_search_without_time_says_that_it_does_not_know_what_would_show(search):
+    diagnosis, _ = search(0.0052, seconds=0.5)
+    assert not diagnosis.detectability
+    assert "how small an effect" in diagnosis.statement
+
+
+def test_a_long_fit_ends_between_its_steps(tmp_path):
+    observations = observed(measured(beam(tmp_path, thickness_m=0.0052)), BAND_HZ)
+    posed = pose_problem(beam(tmp_path), split_data(observations), BAND_HZ, DiagnoseOptions(), {})
+    clock = Clock()
+    problem = replace(posed, deadline=Deadline(seconds=4.5, clock=clock))
+    with pytest.raises(DeadlineError):
+        problem.fit_exactly(problem.fit_roughly((), np.zeros(0)))
+    assert clock.looks == 6  # one when the clock starts, one for the hypothesis, and then one a step
 
 
 @pytest.mark.slow

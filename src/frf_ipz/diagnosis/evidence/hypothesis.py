@@ -9,6 +9,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.catalogue.joint_change import build_together, typical_change
+from frf_ipz.diagnosis.deadline import NO_LIMIT, Deadline
 from frf_ipz.diagnosis.model.basis import Basis, enrich_basis
 from frf_ipz.diagnosis.model.change import NO_CHANGE, Change
 from frf_ipz.diagnosis.model.modes import (
@@ -78,6 +79,8 @@ class Hypothesis:
         Model, layout and tolerances.
     nuisance_prior : NuisancePrior
         Nuisance parameters.
+    deadline : Deadline
+        When no further step of a fit is made.
     """
 
     components: tuple[Component, ...]
@@ -88,6 +91,7 @@ class Hypothesis:
     rows: MotionRows
     context: ModelContext
     nuisance_prior: NuisancePrior
+    deadline: Deadline = NO_LIMIT
     _latest: dict[bytes, ModifiedStructure] = field(init=False, default_factory=dict, repr=False)
 
     @property
@@ -172,7 +176,12 @@ class Hypothesis:
 
 
 def make_hypothesis(
-    context: ModelContext, nuisance_prior: NuisancePrior, components: tuple[Component, ...], *, exact: bool = True
+    context: ModelContext,
+    nuisance_prior: NuisancePrior,
+    components: tuple[Component, ...],
+    *,
+    exact: bool = True,
+    deadline: Deadline = NO_LIMIT,
 ) -> Hypothesis:
     """Make a hypothesis.
 
@@ -187,6 +196,8 @@ def make_hypothesis(
     exact : bool
         Add the static shapes that the last component needs; without them a global scan is faster. Those of the
         components before it are added always: what one more component changes is compared with a fit of theirs.
+    deadline : Deadline
+        When no further step of a fit is made.
 
     Returns
     -------
@@ -215,4 +226,5 @@ def make_hypothesis(
         rows=make_motion_rows(basis, context.layout, moved, nuisance_prior),
         context=context,
         nuisance_prior=nuisance_prior,
+        deadline=deadline,
     )

@@ -62,7 +62,7 @@ class InferenceProblem:
     kind : str
         What was measured: impacts of a ``hammer``, ``random`` records from rest, ``running`` ones, or ``frf``.
     deadline : Deadline
-        When no further hypothesis is made.
+        When no further hypothesis is made, and no further step of a fit.
     """
 
     context: ModelContext
@@ -84,7 +84,9 @@ class InferenceProblem:
         if key in self._known:
             hypothesis = self._known.pop(key)
         else:
-            hypothesis = make_hypothesis(self.context, self.nuisance_prior, components, exact=exact)
+            hypothesis = make_hypothesis(
+                self.context, self.nuisance_prior, components, exact=exact, deadline=self.deadline
+            )
         self._known[key] = hypothesis  # the latest is last
         if len(self._known) > 1 and len(self._known) * hypothesis.basis.vectors.nbytes > REMEMBERED_BYTES:
             self._known.pop(next(iter(self._known)))

@@ -98,6 +98,11 @@ def fit_map(
     -------
     Fit
         At the maximum, or where it was stopped.
+
+    Raises
+    ------
+    DeadlineError
+        If the hypothesis' time is over.
     """
     problem = _MapProblem(hypothesis=hypothesis, data=data)
     start = problem.evaluate(
@@ -153,6 +158,7 @@ class _MapProblem:
 
     def linearise(self, point: _Point) -> _Linearisation:
         """Derive by all parameters; where data say nothing of one, its prior is uniform."""
+        self.hypothesis.deadline.check()  # the longest part of a step
         hypothesis, data = self.hypothesis, self.data
         m, n_parameters = hypothesis.nuisance_prior.n_modes, len(hypothesis.parameters)
         changes, squares, ratios = [], [], []

@@ -140,13 +140,14 @@ def search_component(problem: InferenceProblem, base: Fit) -> Ranking:
             n_tried += _add_by_score_test(problem, base, fits)
         if fits and (n_effects := _count_searched_effects(base, fits)):
             search_neighbourhoods(problem, base, fits, n_effects)
+        ranked = rank_fits(problem, fits.values())
     except DeadlineError:
         if not fits:
             raise
-        is_complete = False
+        ranked, is_complete = _sort_by_evidence(fits.values()), False
     return Ranking(
         base=base,
-        fits=rank_fits(problem, fits.values()),
+        fits=ranked,
         n_tried=n_tried,
         refined=tuple(refined),
         is_complete=is_complete,
@@ -168,13 +169,17 @@ def rank_fits(problem: InferenceProblem, fits: Iterable[Fit]) -> tuple[Fit, ...]
     tuple of Fit
         The best first.
     """
-    order = sorted(fits, key=lambda fit: -fit.log_evidence)
+    order = _sort_by_evidence(fits)
     cost_limit = find_cost_limit(order)
     continued = [
         fit if fit.has_converged or fit.is_far_off or fit.cost > cost_limit else problem.fit_to_convergence(fit)
         for fit in order[:N_CONTINUED]
     ]
-    return tuple(sorted([*continued, *order[N_CONTINUED:]], key=lambda fit: -fit.log_evidence))
+    return _sort_by_evidence([*continued, *order[N_CONTINUED:]])
+
+
+def _sort_by_evidence(fits: Iterable[Fit]) -> tuple[Fit, ...]:
+    return tuple(sorted(fits, key=lambda fit: -fit.log_evidence))
 
 
 def search_small_component(problem: InferenceProblem, base: Fit, min_log_bayes_factor: float) -> Ranking:

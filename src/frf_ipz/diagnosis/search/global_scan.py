@@ -385,6 +385,7 @@ def _scan(
     local = problem.nuisance_prior.unpack(nuisance).local
 
     def evaluate(some: Sequence[Component]) -> list[Start]:
+        problem.deadline.check()
         shown = show_components(context, some)
         return [
             *scan_signatures(*shown.signed, response, basis, layout, measured, weights),

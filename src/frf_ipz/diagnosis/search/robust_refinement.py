@@ -153,6 +153,7 @@ class _RobustProblem:
 
     def linearise(self, point: _RobustPoint) -> NormalEquations:
         """Derive by differences, away from the upper bound."""
+        self.hypothesis.deadline.check()
         robust = self.weights / (1 + np.sum(self.weights * np.abs(point.misfit) ** 2, 1))[:, None]
         columns = []
         for index in range(len(point.searched)):

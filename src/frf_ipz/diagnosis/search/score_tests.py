@@ -201,6 +201,7 @@ def _score_readings(test: ScoreTest, components: Sequence[Component], readings: 
     local = hypothesis.nuisance_prior.unpack(test.base.nuisance).local
     starts = []
     for channel, members in group_readings(readings):
+        test.problem.deadline.check()
         motions = [readings[member].motion for member in members]
         frfs, values = read_elsewhere(base, hypothesis.basis, hypothesis.context.layout, local, channel, motions)
         all_values = np.repeat(base.values[:, :, None], len(members), 2)
@@ -217,6 +218,7 @@ def _score_signatures(test: ScoreTest, signed: list[tuple[Component, Signature]]
     best: dict[int, Start] = {}
     batch: list[tuple[int, int, ComplexArray]] = []
     for first in range(0, len(signed), MOTIONS_AT_ONCE):
+        test.problem.deadline.check()
         group = signed[first : first + MOTIONS_AT_ONCE]
         motions = [Motion.of(signature.motion) for _, signature in group]
         hypothesis = test.base.hypothesis

@@ -69,12 +69,13 @@ def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet, *, is_as
 
     def compute(progress: Progress) -> Diagnosis:
         words = _Words(progress=progress)
+        deadline = Deadline(seconds=seconds, at_check=words.repeat)
         observations = observe(inputs.test, ingest=ingest_options, frfs=frfs, fit=inputs.options.fit)
         return find_causes(
             model,
             observations,
             EffectCatalogue(options=options, folder=inputs.folder, own=inputs.effects),
-            deadline=Deadline(seconds=seconds, at_check=words.repeat),
+            deadline=deadline,
             only_where_they_differ=run == "auto",
             progress=words,
         )
