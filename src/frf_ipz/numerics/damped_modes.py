@@ -15,10 +15,11 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 STEPS = 80  # of the iteration: of the few modes that take so many, the work is below that of the eigenvalue problem
 FEW = 16  # modes, up to which the eigenvalue problem costs less
 ROUNDING = 64 * np.finfo(float).eps  # relative step from which a mode counts as found
+UNDAMPED = 1e-9  # of the largest rate: below it damping leaves a mode alone, as it does rigid-body modes
 COUPLED = 1e-9  # relative coupling of two modes that were found: they are not orthogonal, so one was found twice
 
 
-def damped_modes(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+def damped_modes(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Poles and their vectors without the conjugates.
 
     Parameters
@@ -34,9 +35,32 @@ def damped_modes(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, 
         Those with an imaginary part above 0, then the real ones, rad/s.
     vectors : (n, k) array
         In the undamped modes.
+    left_vectors : (n, k) array
+        So scaled that the sum of ``vectors left_vectors^T / (s - poles)``, with the conjugates of the poles that are not
+        real, is the receptance.
     """
+    sizes = np.abs(rates).max(axis=1, initial=0.0)
+    alone = np.flatnonzero((sizes <= UNDAMPED * sizes.max(initial=0.0)) & (squares > 0.0))
+    if not len(alone):
+        return _of_damped(squares, rates)
+    own = 1j * np.sqrt(squares[alone])
+    unit = np.eye(len(squares), dtype=complex)
+    others = np.delete(np.arange(len(squares)), alone)
+    poles, vectors, left_vectors = _of_damped(squares[others], rates[np.ix_(others, others)])
+    return (
+        np.concatenate([own, poles]),
+        np.concatenate([unit[:, alone], unit[:, others] @ vectors], axis=1),
+        np.concatenate([unit[:, alone] / (2 * own), unit[:, others] @ left_vectors], axis=1),
+    )
+
+
+def _of_damped(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     found = _from_undamped(squares, rates) if len(squares) > FEW else None
-    return _by_eigenvalues(squares, rates) if found is None else found
+    if found is None:
+        return _by_eigenvalues(squares, rates)
+    poles, vectors = found
+    slope = 2 * poles * np.sum(vectors**2, axis=0) + np.sum(vectors * (rates @ vectors), axis=0)
+    return poles, vectors, vectors / slope
 
 
 def _from_undamped(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, ComplexArray] | None:
@@ -80,7 +104,7 @@ def _are_different(poles: ComplexArray, vectors: ComplexArray, rates: FloatArray
     return bool((off <= COUPLED * np.sqrt(slopes[:, None] * slopes)).all())
 
 
-def _by_eigenvalues(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+def _by_eigenvalues(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     count = len(squares)
     top = max(float(np.abs(squares).max(initial=0.0)), np.finfo(float).tiny)
     scale = np.sqrt(top)
@@ -90,4 +114,6 @@ def _by_eigenvalues(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArra
     state[count:, count:] = -rates / scale
     values, vectors = np.linalg.eig(state)
     chosen = np.concatenate([np.flatnonzero(values.imag > 0), np.flatnonzero(values.imag == 0)])
-    return values[chosen].astype(complex) * scale, vectors[:count, chosen].astype(complex)
+    left_vectors = np.linalg.inv(vectors)[chosen, count:].T / scale  # not those of the other side where roots repeat
+    poles = values[chosen].astype(complex) * scale
+    return poles, vectors[:count, chosen].astype(complex), left_vectors.astype(complex)

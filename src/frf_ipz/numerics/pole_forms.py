@@ -220,7 +220,7 @@ def damped_form(
     top = max(float(np.abs(squares).max(initial=0.0)), np.finfo(float).tiny)
     free = (np.abs(squares) <= RIGID * top) & (np.abs(rates).max(axis=1) <= UNDAMPED * np.abs(rates).max())
     elastic, rates = np.flatnonzero(~free), rates[np.ix_(~free, ~free)]
-    upper, vectors = damped_modes(squares[elastic], rates)
+    upper, vectors, _ = damped_modes(squares[elastic], rates)
     slope = 2 * upper * np.sum(vectors**2, axis=0) + np.sum(vectors * (rates @ vectors), axis=0)
     oscillates = upper.imag > 0
 

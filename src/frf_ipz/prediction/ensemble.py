@@ -121,7 +121,5 @@ class ModelEnsemble:
 def _roots(
     squares: FloatArray, shapes: FloatArray, rates: FloatArray
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    poles, vectors = damped_modes(squares, (rates + rates.T) / 2)
-    slope = 2 * poles * np.sum(vectors**2, axis=0) + np.sum(vectors * (rates @ vectors), axis=0)
-    right = shapes @ vectors
-    return poles, right, right / np.where(poles.imag > 0, slope, 2 * slope)
+    poles, vectors, left_vectors = damped_modes(squares, (rates + rates.T) / 2)
+    return poles, shapes @ vectors, shapes @ left_vectors * np.where(poles.imag > 0, 1.0, 0.5)

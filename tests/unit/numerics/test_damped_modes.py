@@ -26,8 +26,8 @@ def residual(squares, rates, poles, vectors):
 @pytest.mark.parametrize(("coupling", "closest"), [(0.0, 1.0), (0.3, 1.0), (0.3, 1e-3), (0.3, 0.0), (30.0, 1.0)])
 def test_poles_are_those_of_the_eigenvalue_problem(coupling, closest):
     squares, rates = model(coupling=coupling, closest=closest)
-    poles, vectors = damped_modes(squares, rates)
-    expected, _ = module._by_eigenvalues(squares, rates)
+    poles, vectors, _ = damped_modes(squares, rates)
+    expected, _, _ = module._by_eigenvalues(squares, rates)
     assert_allclose(np.sort_complex(poles), np.sort_complex(expected), rtol=1e-10)
     assert residual(squares, rates, poles, vectors).max() < 1e-10
 
@@ -40,7 +40,7 @@ def test_lightly_coupled_modes_need_no_eigenvalue_problem(monkeypatch):
 
 def test_a_mode_that_is_found_twice_is_refused():
     squares, rates = model(coupling=0.3)
-    poles, vectors = damped_modes(squares, rates)
+    poles, vectors, _ = damped_modes(squares, rates)
     assert module._are_different(poles, vectors, rates)
     assert not module._are_different(poles[[0, 0]], np.ascontiguousarray(vectors[:, [0, 0]]), rates)
 
@@ -48,6 +48,24 @@ def test_a_mode_that_is_found_twice_is_refused():
 def test_an_overdamped_mode_has_two_real_poles():
     squares, rates = model(coupling=0.0)
     rates[0, 0] = 4 * np.sqrt(squares[0])
-    poles, _ = damped_modes(squares, rates)
+    poles, _, _ = damped_modes(squares, rates)
     assert len(poles) == ORDER + 1
     assert np.count_nonzero(poles.imag == 0) == 2
+
+
+@pytest.mark.parametrize("coupling", [0.0, 0.3])
+@pytest.mark.parametrize("order", [12, ORDER])
+def test_roots_that_repeat_and_modes_without_damping_give_the_receptance(coupling, order):
+    """A floating body has six modes alike, which damping leaves alone; a square plate has pairs."""
+    squares, rates = (part[..., :order] for part in model(coupling=coupling))
+    rates = rates[:order].copy()
+    squares[:6], rates[:6], rates[:, :6] = 1.0, 1e-14, 1e-14
+    squares[7], rates[7] = squares[6], rates[6]
+    rates[:, 7] = rates[7]
+    rates[7, 7] = rates[6, 6] = max(rates[6, 6], rates[6, 7])
+    poles, vectors, left_vectors = damped_modes(squares, rates)
+    left_vectors = left_vectors * np.where(poles.imag > 0, 1.0, 0.5)
+    for s in (50j, 650j, 3000j):
+        exact = np.linalg.inv(s**2 * np.eye(order) + s * rates + np.diag(squares))
+        found = (vectors / (s - poles)) @ left_vectors.T + (vectors.conj() / (s - poles.conj())) @ left_vectors.conj().T
+        assert_allclose(found, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
