@@ -36,8 +36,8 @@ def damped_modes(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, 
     vectors : (n, k) array
         In the undamped modes.
     left_vectors : (n, k) array
-        So scaled that the sum of ``vectors left_vectors^T / (s - poles)``, with the conjugates of the poles that are not
-        real, is the receptance.
+        So scaled that the sum of ``vectors left_vectors^T / (s - poles)``, with the conjugates of those poles that are
+        not real, is the receptance.
     """
     sizes = np.abs(rates).max(axis=1, initial=0.0)
     alone = np.flatnonzero((sizes <= UNDAMPED * sizes.max(initial=0.0)) & (squares > 0.0))
