@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 Numbers: TypeAlias = ComplexArray | FloatArray
+FAR = 4.0  # times a limit of squared zeros: poles beyond are so smooth below it that a few can stand for all
+STAND_INS = 8  # they leave (1 / FAR)^8 of what the far poles add; zeros begin there, and end at those of all poles
 REPULSIONS = 100  # steps of zeros that repel one another, which need more where several meet
 GOLDEN = (np.sqrt(5) - 1) / 2  # turns that never repeat
 STEPS = 30  # of Newton's method; from near, four are enough
@@ -373,6 +375,77 @@ class DampedModel:
             for output, force in zip(outputs, inputs, strict=True)
         ]
 
+    def zeros_up_to(self, outputs: FloatArray, inputs: FloatArray, limit_rad_s: float) -> list[ComplexArray]:
+        """Zeros of many FRFs up to a frequency, without their vectors.
+
+        They begin at those without damping of a smaller model, in which a few poles stand for all that are far above
+        the limit, and end at those of the model itself. An FRF with a zero that does not is left to `every_zero`.
+
+        Parameters
+        ----------
+        outputs, inputs : (n_frfs, r) array
+            Rows of sensors and excitations.
+        limit_rad_s : float
+            Modulus up to which zeros are asked for, rad/s.
+
+        Returns
+        -------
+        list of complex arrays
+            Of each FRF those with an imaginary part of at least 0, rad/s.
+        """
+        residues = (outputs @ self.undamped.shapes.real) * (inputs @ self.undamped.shapes.real)
+        rates = np.sum(self.undamped.shapes.real * (self._damping @ self.undamped.shapes.real), axis=0)
+        squares, frf, is_sure = _squares_up_to(self.undamped.poles.real, residues, (limit_rad_s * (1 + 2 * CLOSE)) ** 2)
+        with np.errstate(divide="ignore", invalid="ignore"):  # of a zero on a pole, or a double one
+            weights = residues[frf] / (self.undamped.poles.real - squares[:, None]) ** 2
+            shift = (weights @ rates) / weights.sum(axis=1) / 2
+        s = 1j * np.sqrt(squares)
+        s = np.where(s.imag < 0, -s, s)
+        is_real = np.abs(s.imag) <= REAL * np.abs(s)
+        frf = np.concatenate([frf, frf[is_real]])
+        start = np.concatenate([s, -s[is_real]]) - np.concatenate([shift, shift[is_real]])
+        values, is_found = self.damped.zeros(outputs[frf], inputs[frf], start)
+        with np.errstate(invalid="ignore"):
+            is_same = is_found & (np.abs(values - start) <= CLOSE * np.abs(start))
+        is_same &= values.imag >= -REAL * np.abs(values)
+        failed = set(frf[~is_same].tolist()) | set(np.flatnonzero(~is_sure).tolist())
+        result = []
+        for number in range(len(outputs)):
+            of_frf = values[frf == number]
+            if number in failed or _merge(of_frf):
+                of_frf = self.every_zero(outputs[number, None], inputs[number, None])[0].values
+            result.append(of_frf[np.abs(of_frf) <= limit_rad_s])
+        return result
+
+    def slopes(self, output: FloatArray, force: FloatArray, zeros: ComplexArray) -> ComplexArray:
+        """Slope of a receptance over s at its zeros.
+
+        Parameters
+        ----------
+        output, force : (r,) array
+            Rows of sensor and excitation.
+        zeros : (n,) complex array
+            rad/s.
+
+        Returns
+        -------
+        (n,) complex array
+            0 where a pole lies on the zero.
+        """
+        residues, double = self.damped._residues(output[None], force[None])
+        at = _beside_pole(
+            np.asarray(np.repeat(residues, len(zeros), axis=0), complex), double, self.damped.poles, zeros
+        )
+        # at a zero the distance from the nearest pole is -own / rest, which keeps its digits next to that pole
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = at.slope - at.rest**2 / at.own
+        return np.asarray(np.where(at.own == 0.0, 0.0, slope), complex)
+
+    @property
+    def _damping(self) -> FloatArray:
+        damping = self.damped.damping
+        return np.zeros_like(self.damped.mass) if damping is None else damping
+
 
 def every_damped_zero(
     mass: FloatArray, damping: FloatArray, stiffness: FloatArray, outputs: FloatArray, inputs: FloatArray
@@ -548,6 +621,36 @@ def _undamped_zeros(form: PoleForm, output: FloatArray, force: FloatArray) -> Co
     values = np.linalg.eigvals(matrix)
     finite = np.abs(values) > SMALLEST_INVERSE * np.abs(values).max()
     return np.asarray(shift + 1 / values[finite], complex)
+
+
+def _squares_up_to(poles: FloatArray, residues: FloatArray, limit: float) -> tuple[ComplexArray, IntArray, BoolArray]:
+    """Squared zeros below a limit of many undamped FRFs, the FRF of each, and whose are sure to be all."""
+    far = np.flatnonzero(poles > FAR * limit)
+    if len(far) > STAND_INS:
+        # what the far poles add is that of a few of them, with residues that agree about the disc of the limit
+        stand_ins = poles[far[np.linspace(0, len(far) - 1, STAND_INS).astype(int)]]
+        circle = limit * np.exp(1j * np.pi * (np.arange(2 * STAND_INS) + 0.5) / (2 * STAND_INS))
+        wanted, given = (1 / (circle[:, None] - of) for of in (poles[far], stand_ins))
+        real_given, real_wanted = (np.concatenate([numbers.real, numbers.imag]) for numbers in (given, wanted))
+        carry = np.linalg.lstsq(real_given, real_wanted, rcond=None)[0]
+        near = np.flatnonzero(poles <= FAR * limit)
+        residues = np.concatenate([residues[:, near], residues[:, far] @ carry.T], axis=1)
+        poles = np.concatenate([poles[near], stand_ins])
+    top = float(np.abs(poles).max(initial=0.0))
+    shift = -top / np.sqrt(max(len(poles), 1)) if not np.isfinite(limit) else -limit
+    inverse = 1 / (poles - shift)
+    size = np.sqrt(np.abs(residues))
+    response = residues @ inverse
+    is_sure = np.abs(response) > SMALL_RESIDUE * (np.abs(residues) @ np.abs(inverse))  # else a zero is near the shift
+    sides = inverse * size
+    rows = np.sign(residues) * sides / np.where(is_sure, response, 1.0)[:, None]
+    matrices = np.diag(inverse) - sides[:, :, None] * rows[:, None, :]
+    values = np.linalg.eigvals(matrices).astype(complex)
+    finite = np.abs(values) > SMALLEST_INVERSE * np.abs(values).max(axis=1, keepdims=True, initial=0.0)
+    frf, places = np.nonzero(finite)
+    squares = np.asarray(shift + 1 / values[frf, places], complex)
+    inside = np.abs(squares) <= limit
+    return squares[inside], frf[inside], is_sure
 
 
 def _merge(values: ComplexArray) -> bool:

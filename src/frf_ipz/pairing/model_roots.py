@@ -9,7 +9,7 @@ import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.numerics.pencils import Roots, damped_poles
-from frf_ipz.numerics.pole_forms import every_damped_zero
+from frf_ipz.numerics.pole_forms import DampedModel, every_damped_zero
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,6 +58,22 @@ class ModelZeros:
     values: ComplexArray
     kind: tuple[str, ...]
     slope_sign: FloatArray
+
+    def up_to(self, limit_rad_s: float) -> ModelZeros:
+        """Select those up to a modulus.
+
+        Parameters
+        ----------
+        limit_rad_s : float
+            The modulus, rad/s.
+
+        Returns
+        -------
+        ModelZeros
+            The first ones.
+        """
+        count = int(np.searchsorted(np.abs(self.values), limit_rad_s, side="right"))
+        return ModelZeros(values=self.values[:count], kind=self.kind[:count], slope_sign=self.slope_sign[:count])
 
 
 def model_poles(model: ReducedModel, labels: tuple[FrfLabel, ...]) -> ModelPoles:
@@ -108,7 +124,7 @@ def model_shapes(model: ReducedModel, dofs: tuple[AnyDof, ...]) -> ModelPoles:
     return ModelPoles(values=roots.values, amplitudes=(shapes / modal_mass).T)
 
 
-def model_zeros(model: ReducedModel, labels: Sequence[FrfLabel]) -> list[ModelZeros]:
+def model_zeros(model: ReducedModel, labels: Sequence[FrfLabel], *, limit_rad_s: float = np.inf) -> list[ModelZeros]:
     """Compute the zeros of FRFs of a model.
 
     Parameters
@@ -117,19 +133,41 @@ def model_zeros(model: ReducedModel, labels: Sequence[FrfLabel]) -> list[ModelZe
         The model.
     labels : sequence of FrfLabel
         Which FRFs.
+    limit_rad_s : float
+        Modulus up to which zeros are asked for; all finite ones where it is left out.
 
     Returns
     -------
     list of ModelZeros
-        The finite ones of each.
+        Of each FRF; those below a limit have the same indices as among all.
     """
+    if not labels:
+        return []
     outputs = np.array([model.row(label.output_dof) for label in labels])
     inputs = np.array([model.row(label.input_dof) for label in labels])
-    every = every_damped_zero(model.mass, model.damping, model.stiffness, outputs, inputs)
-    return [_zeros_of(model, *frf) for frf in zip(every, outputs, inputs, strict=True)]
+    by_poles = DampedModel.of(model.mass, model.damping, model.stiffness)
+    if by_poles is not None and np.isfinite(limit_rad_s):
+        # of a quadruple one may lie below the limit and the other above
+        every = by_poles.zeros_up_to(outputs, inputs, limit_rad_s * (1 + MIRRORED))
+        found = [_zeros_of(by_poles, *frf) for frf in zip(every, outputs, inputs, strict=True)]
+        return [zeros.up_to(limit_rad_s) for zeros in found]
+    roots = every_damped_zero(model.mass, model.damping, model.stiffness, outputs, inputs)
+    found = [_zeros_with_vectors(model, *frf) for frf in zip(roots, outputs, inputs, strict=True)]
+    return [zeros.up_to(limit_rad_s) for zeros in found]
 
 
-def _zeros_of(model: ReducedModel, upper: Roots, output: FloatArray, force: FloatArray) -> ModelZeros:
+def _zeros_of(model: DampedModel, values: ComplexArray, output: FloatArray, force: FloatArray) -> ModelZeros:
+    values = values[np.argsort(np.abs(values), kind="stable")]
+    kinds, is_listed = _kinds(values)
+    values = values[is_listed]
+    return ModelZeros(
+        values=values,
+        kind=tuple(kind for kind, listed in zip(kinds, is_listed, strict=True) if listed),
+        slope_sign=np.sign((1j * model.slopes(output, force, values)).real),
+    )
+
+
+def _zeros_with_vectors(model: ReducedModel, upper: Roots, output: FloatArray, force: FloatArray) -> ModelZeros:
     order = np.argsort(np.abs(upper.values), kind="stable")
     upper = upper.take(order)
     kinds, is_listed = _kinds(upper.values)

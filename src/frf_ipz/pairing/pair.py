@@ -15,7 +15,7 @@ from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.pairing.model_roots import ModelPoles, ModelZeros, model_poles, model_shapes, model_zeros
 from frf_ipz.pairing.pairs import Pair, Pairs, PairVerdict
 from frf_ipz.pairing.poles import PolePairing, pair_poles
-from frf_ipz.pairing.zeros import ZeroPairing, in_band, pair_zeros
+from frf_ipz.pairing.zeros import ZeroPairing, highest_zero, in_band, pair_zeros
 from frf_ipz.structure import ReducedModel
 
 if TYPE_CHECKING:
@@ -74,7 +74,8 @@ def pair_roots(fit: ModalFit, reduced_model: ReducedModel) -> Pairs:
     rows = _pole_rows(fit, poles, pole_pairing)
     paired_poles = _paired_logs(rows)
     zero_std = np.sqrt(np.maximum(fit.covariance.diagonal()[2 * fit.n_modes + 1 :: 2], 0.0))
-    for frf, zeros in enumerate(model_zeros(reduced_model, fit.labels)):
+    limit = highest_zero(fit, paired_poles)
+    for frf, zeros in enumerate(model_zeros(reduced_model, fit.labels, limit_rad_s=limit)):
         zero_pairing = pair_zeros(fit, frf, zeros, paired_poles, float(pole_pairing.gains[frf]))
         rows += _zero_rows(fit, frf, zeros, zero_pairing, paired_poles, zero_std)
     return Pairs(rows=tuple(rows), labels=fit.labels, warnings=tuple(_warnings(rows, pole_pairing, fit.labels)))

@@ -99,6 +99,26 @@ def pair_zeros(
     )
 
 
+def highest_zero(fit: ModalFit, poles: tuple[FloatArray, FloatArray]) -> float:
+    """Modulus up to which zeros of the model have a part in pairing.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The fitted model.
+    poles : pair of (k,) arrays
+        Logarithms of the moduli of the paired poles, measured and computed.
+
+    Returns
+    -------
+    float
+        On the model's axis, rad/s: beyond the band, and out of reach of every measured zero that can be a target.
+    """
+    pairable = np.isin(np.array(fit.zeros.kind, str), PAIRABLE) & fit.zeros.identifiable
+    logs = np.log(np.append(np.abs(fit.zeros.values[pairable]), 2 * np.pi * fit.band_hz[1]))
+    return float(np.exp(map_frequency(logs, *poles).max() + ZERO_GATE))
+
+
 def map_frequency(logs: FloatArray, measured: FloatArray, computed: FloatArray) -> FloatArray:
     """Map measured frequencies onto the model's axis by the paired poles around them.
 

@@ -125,6 +125,35 @@ def test_zeros_that_damping_moves_far_are_found_without_the_pencil(rows, monkeyp
     assert_allclose(upper_of(found.values), expected, rtol=1e-7)
 
 
+@pytest.mark.parametrize("part", [0.2, 0.5, 3.0])
+@pytest.mark.parametrize("rigid", [False, True])
+def test_zeros_up_to_a_limit_are_those_of_the_pencil_with_their_slopes(rigid, part):
+    """A spectrum so wide that a few poles stand for the highest ones."""
+    rng = np.random.default_rng(2)
+    order = 40
+    shapes = rng.standard_normal((order, order)) / np.sqrt(order) + np.eye(order)
+    inverse = np.linalg.inv(shapes)
+    omega = 100.0 * np.arange(0 if rigid else 1, order + (0 if rigid else 1)) ** 1.5
+    mass, damping, stiffness = (
+        inverse.T @ np.diag(diagonal) @ inverse for diagonal in (np.ones(order), 0.01 * omega, omega**2)
+    )
+    mass, damping, stiffness = ((matrix + matrix.T) / 2 for matrix in (mass, damping, stiffness))
+    outputs, inputs = rng.standard_normal((2, 5, order))
+    inputs[4] = outputs[4]
+    model = pole_forms.DampedModel.of(mass, damping, stiffness)
+    limit = part * omega[20]
+    found = model.zeros_up_to(outputs, inputs, limit)
+    for zeros, output, force in zip(found, outputs, inputs, strict=True):
+        expected = upper_of(damped_zeros(mass, damping, stiffness, output, force).values)
+        assert_allclose(upper_of(zeros), upper_of(expected[np.abs(expected) <= limit]), rtol=1e-6)
+        step = 1e-6 * np.abs(zeros)
+        values = [
+            np.array([output @ np.linalg.solve(s**2 * mass + s * damping + stiffness, force) for s in zeros + side])
+            for side in (-step, step)
+        ]
+        assert_allclose(model.slopes(output, force, zeros), (values[1] - values[0]) / (2 * step), rtol=1e-3)
+
+
 def test_zeros_that_are_not_all_are_told_from_all(rows):
     mass, damping, stiffness = matrices(dashpot=3e4)
     numerator = pole_forms._Numerator.of(damped_form(mass, damping, stiffness), *rows)
