@@ -14,7 +14,14 @@ from scipy.optimize import linear_sum_assignment
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NumericalError
 from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros, undamped_poles
-from frf_ipz.numerics.pole_forms import PoleForm, damped_form, every_damped_zero, every_undamped_zero, undamped_form
+from frf_ipz.numerics.pole_forms import (
+    DampedModel,
+    PoleForm,
+    damped_form,
+    every_damped_zero,
+    every_undamped_zero,
+    undamped_form,
+)
 
 SAME_ROOT = 0.5  # overlap of its vectors with those before, above which no other root can be more alike
 APART = 1e-9  # relative distance below which two zeros of an FRF are one
@@ -113,6 +120,33 @@ class TargetRoots:
         pairs = [self.rows[number] for number in frfs]
         outputs, inputs = (np.array([pair[side] for pair in pairs]) for side in range(2))
         return every_damped_zero(mass, damping, stiffness, outputs, inputs)
+
+    def zeros_up_to(
+        self, limit_rad_s: float, frfs: list[int], mass: FloatArray, damping: FloatArray, stiffness: FloatArray
+    ) -> list[ComplexArray]:
+        """Compute the zeros of some FRFs up to a frequency.
+
+        Parameters
+        ----------
+        limit_rad_s : float
+            Largest modulus, rad/s.
+        frfs : list of int
+            Numbers of the FRFs.
+        mass, damping, stiffness : (r, r) array
+            The model.
+
+        Returns
+        -------
+        list of complex arrays
+            Of each FRF those with an imaginary part of at least 0, rad/s.
+        """
+        model = DampedModel.of(mass, damping, stiffness) if frfs else None
+        if model is None:
+            every = self.every_zero(frfs, mass, damping, stiffness)
+            return [roots.values[np.abs(roots.values) <= limit_rad_s] for roots in every]
+        pairs = [self.rows[number] for number in frfs]
+        outputs, inputs = (np.array([pair[side] for pair in pairs]) for side in range(2))
+        return model.zeros_up_to(outputs, inputs, limit_rad_s)
 
     def near(self, form: PoleForm, start: ComplexArray, targets: IntArray) -> tuple[Roots, BoolArray]:
         """Find zeros from near.
@@ -333,10 +367,12 @@ def nearest_roots(
         found &= np.abs(roots.values - reference[zeros]) < UNMOVED * np.abs(reference[zeros])
         values[zeros] = np.where(found, roots.values, 0.0)
         lost = _lost(targets, zeros, found)
-        of_lost = targets.every_zero(list(lost), mass, damping, stiffness)
+        # one of twice the modulus is farther from a value than none at all
+        limit = 2 * float(np.abs(reference[zeros]).max())
+        of_lost = targets.zeros_up_to(limit, list(lost), mass, damping, stiffness)
         for members, every in zip(lost.values(), of_lost, strict=True):
             values[zeros[members]] = 0.0
-            assign(zeros[members], every.values)
+            assign(zeros[members], every)
     return values
 
 
