@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Curves, Diagnosis, Finding, Misfit
 
 MOST_ALTERNATIVES = 15
-SURELY_NOT = 1e-6  # a probability below is written as being below
 CLOSE = 0.8  # of the best evidence: where all explanations gain more, their differences are drawn
 SLIVER = 1e-4  # of the longest bar: all that is drawn of a loss, so that its text still shows
 WIDE_EVIDENCES = 30.0  # ratio of evidences from which their axis is logarithmic
@@ -138,14 +137,14 @@ def describe_ranking(diagnosis: Diagnosis) -> Picture | None:
             for finding in ranked
         ],
         values=gains,
-        hover="{y}: log Bayes factor {value:.6g}, {text}",
+        hover="{y}: log Bayes factor {value:.0f}, {text}",
     )
     falls_short = "Log evidence below the best explanation: the longer, the worse"
     return Picture(
         name="ranking",
         title="Explanations by their evidence",
         alt="Log Bayes factors: "
-        + "; ".join(f"{name}: {number(gain)}" for name, gain in zip(names, gains.tolist(), strict=True)),
+        + "; ".join(f"{name}: {evidence_text(finding)}" for name, finding in zip(names, ranked, strict=True)),
         panels=(Panel(y=Axis(scale="category", is_reversed=True), layers=(bars,)),),
         x=Axis(
             title=falls_short if is_close else "Log Bayes factor over the model without it",
@@ -175,7 +174,7 @@ def effect_name(effect: str) -> str:
 
 
 def probability_text(finding: Finding) -> str:
-    """Write a probability: what is not needed has none, and nobody reads a number with 190 zeros.
+    """Write a probability as the statements do; what is not needed has none.
 
     Parameters
     ----------
@@ -185,11 +184,28 @@ def probability_text(finding: Finding) -> str:
     Returns
     -------
     str
-        Behind a sign, as in ``= 0.98``; a dash where there is none.
+        As in ``= 0.98`` or ``above 0.999``; a dash where there is none.
     """
     if finding.log_evidence_gain <= 0:
         return "–"
-    return f"= {number(finding.probability, 3)}" if finding.probability > SURELY_NOT else "< 1e-6"
+    words = finding.confidence.removeprefix("probability ")
+    return f"= {words}" if words[0].isdigit() else words
+
+
+def evidence_text(finding: Finding) -> str:
+    """Write a log Bayes factor in the digits that the Laplace approximation gives it: no decimals.
+
+    Parameters
+    ----------
+    finding : Finding
+        Found or tried.
+
+    Returns
+    -------
+    str
+        As in ``2310``.
+    """
+    return f"{finding.log_evidence_gain:.0f}"
 
 
 def compared_misfits(diagnosis: Diagnosis) -> dict[str, Misfit]:

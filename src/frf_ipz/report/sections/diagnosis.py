@@ -9,6 +9,7 @@ from frf_ipz.plotting.diagnosis import (
     MOST_ALTERNATIVES,
     compared_misfits,
     effect_name,
+    evidence_text,
     held_out_name,
     probability_text,
 )
@@ -75,7 +76,7 @@ def _finding_table(diagnosis: Diagnosis) -> Table:
                 finding.location.text,
                 _parameters(finding),
                 probability_text(finding).removeprefix("= "),
-                number(finding.log_evidence_gain, 6),
+                evidence_text(finding),
                 typeset(finding.statement if kind == found else _as_hypothesis(finding.statement)),
             ]
             for finding in entries
