@@ -197,11 +197,17 @@ def test_a_wide_band_is_seen(evidence, half_width_db, verdict):
     assert the(prediction.band_width, replace(evidence, prediction=unknown)).verdict is WITH_CARE
 
 
-def test_a_misfit_far_above_the_noise_is_seen(evidence):
+@pytest.mark.parametrize(("share", "verdict"), [(0.05, USABLE), (0.2, WITH_CARE)])
+def test_a_misfit_far_above_the_noise_is_seen_where_it_is_more_than_a_controller_bears(evidence, share, verdict):
     assert the(quality.fit, evidence).verdict is USABLE
-    misfit = evidence.fit.misfit.assign(ratio=[1.0] * (len(evidence.fit.misfit) - 1) + [20.0])
+    misfit = evidence.fit.misfit.copy()
+    last = misfit.index[-1]
+    lines_hz = evidence.frfs.frequency_hz[evidence.lines]
+    shown = evidence.measured[lines_hz >= misfit.loc[last, "band_low_hz"], misfit.loc[last, "frf"]]
+    misfit.loc[last, ["ratio", "misfit"]] = 20.0, share * np.sqrt(np.mean(np.abs(shown) ** 2))
     check = the(quality.fit, replace(evidence, fit=replace(evidence.fit, misfit=misfit)))
-    assert (check.verdict, check.figure) == (WITH_CARE, 20.0)
+    assert (check.verdict, check.figure) == (verdict, 20.0)
+    assert f"{20 * np.log10(1 + share):.2g} dB" in check.says
 
 
 @pytest.mark.parametrize(("ratio", "verdict"), [(0.6, USABLE), (0.4, WITH_CARE), (2.5, WITH_CARE)])

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.assessment.assessment import Check, Verdict
+from frf_ipz.control_margins import GAIN_MARGIN_DB, SIXTH
 
 if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
     from frf_ipz.assessment.evidence import Evidence
 
 WORST_MISFIT = 10.0  # times the noise: stated deviations of poles and zeros then mean nothing
@@ -32,18 +34,33 @@ def fit(evidence: Evidence) -> Iterator[Check]:
     misfit = evidence.fit.misfit
     if "ratio" not in misfit or not np.isfinite(misfit["ratio"]).any():
         return
-    row = misfit.iloc[int(np.nanargmax(misfit["ratio"].to_numpy(float)))]
-    ratio, where = float(row["ratio"]), f"{row['output_dof']} / {row['input_dof']}"
-    too_much = ratio > WORST_MISFIT
+    ratios = misfit["ratio"].to_numpy(float)
+    costs = (ratios > WORST_MISFIT) & (_misfit_db(evidence) > SIXTH * GAIN_MARGIN_DB)
+    worst = int(np.nanargmax(np.where(costs, ratios, -1.0) if costs.any() else ratios))
+    row, ratio = misfit.iloc[worst], float(ratios[worst])
+    where = f"{row['output_dof']} / {row['input_dof']}"
     yield Check(
         name="misfit of the fit",
-        verdict=Verdict.WITH_CARE if too_much else Verdict.USABLE,
+        verdict=Verdict.WITH_CARE if costs.any() else Verdict.USABLE,
         figure=ratio,
         limit=WORST_MISFIT,
         unit="noise",
         where=where,
-        says=f"the fit leaves {ratio:.2g} times the noise of {where}; 1 is all that the measurement can tell",
-        advice="narrow [fit] band_hz, or look at the recordings of that FRF" if too_much else "",
+        says=f"the fit leaves {ratio:.2g} times the noise of {where}, {_misfit_db(evidence)[worst]:.2g} dB of it; "
+        "1 is all that the measurement can tell",
+        advice="narrow [fit] band_hz, or look at the recordings of that FRF" if costs.any() else "",
+    )
+
+
+def _misfit_db(evidence: Evidence) -> FloatArray:
+    """Give what the misfit is of each FRF and band beside the FRF itself, dB: (n_rows,)."""
+    powers, lines_hz = np.abs(evidence.measured) ** 2, evidence.frfs.frequency_hz[evidence.lines]
+    rows = evidence.fit.misfit[["frf", "band_low_hz", "band_high_hz", "misfit"]].itertuples(index=False)
+    return np.array(
+        [
+            20 * np.log10(1 + size / np.sqrt(np.nanmean(powers[(lines_hz >= low) & (lines_hz <= high), int(frf)])))
+            for frf, low, high, size in rows
+        ]
     )
 
 
