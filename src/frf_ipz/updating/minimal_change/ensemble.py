@@ -15,6 +15,8 @@ from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, is_negative
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase
 from frf_ipz.updating.parameters import unwhiten
 
+MOST_HALVINGS = 53  # bits of a number: what is as far as that from the mean is the mean
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Posterior:
@@ -79,7 +81,7 @@ def _draw_stiffness(
     posterior: Posterior, rng: np.random.Generator, count: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     phase, result = posterior.stiffness, posterior.stiffness_result
-    whitened = _draw(result, rng, count)
+    whitened = _with_positive_mass(posterior, _draw(result, rng, count))
     theta = unwhiten(phase.terms, result.scales[:-1], whitened)
     mass, stiffness = phase.matrices(theta)
     # the poles predicted by the linear step are imposed: far from the mean, second-order terms would blur them
@@ -97,6 +99,21 @@ def _draw_stiffness(
         return theta, mass, stiffness
     n_negative = int(np.count_nonzero(is_negative(phase.eigenvalues)))
     return theta, mass, _with_poles(mass, stiffness, shapes, squares, n_negative)
+
+
+def _with_positive_mass(posterior: Posterior, whitened: FloatArray) -> FloatArray:
+    """Bring members whose mass no machine has, as those of a model that is far off, half way nearer to the mean."""
+    phase, result = posterior.stiffness, posterior.stiffness_result
+    mean = result.step.mean
+    is_far = np.ones(len(whitened), bool)
+    for _ in range(MOST_HALVINGS):
+        mass, _ = phase.matrices(unwhiten(phase.terms, result.scales[:-1], whitened[is_far]))
+        values = np.linalg.eigvalsh(mass)
+        is_far[is_far] = values[:, 0] <= np.finfo(float).eps * values.shape[1] * values[:, -1]
+        if not is_far.any():
+            break
+        whitened = np.where(is_far[:, None], mean + (whitened - mean) / 2, whitened)
+    return whitened
 
 
 def _draw(result: PhaseResult, rng: np.random.Generator, count: int) -> FloatArray:
