@@ -25,7 +25,9 @@ FRF = tuple(
 
 def measure(*, seed=0, **changed):
     """FRFs of a machine that is 2 % stiffer than its model, and has 3 g more at a node."""
-    machine = frf_ipz.make_beam(**{**BEAM, "youngs_modulus_Pa": 71.4e9, **changed}, point_mass=[EXTRA])
+    machine = frf_ipz.make_beam(
+        **{**BEAM, "youngs_modulus_Pa": 71.4e9, **changed, "point_mass": [EXTRA, *changed.get("point_mass", [])]}
+    )
     values = frf_ipz.compute_frfs(machine, FRF, 2j * np.pi * LINES)
     rng = np.random.default_rng(seed)
     std = NOISE * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
@@ -227,6 +229,16 @@ def test_a_wrong_number_of_the_model_is_named(fit, changed, key):
     cause = cause_of(fit, **changed)
     assert cause.file == "model.toml"
     assert key in cause.line_or_key
+
+
+@pytest.mark.parametrize("changed", [{"density_kg_m3": 2.7}, {"youngs_modulus_Pa": 70.0}])
+def test_a_wrong_unit_is_named_where_a_point_mass_stays_as_it_is(changed):
+    """The frequencies are not off by one factor then."""
+    heavy = [frf_ipz.BeamPointMass(node=6, mass_kg=0.05)]
+    machine = frf_ipz.fit_modes(measure(point_mass=heavy))
+    cause = cause_of(machine, **changed, point_mass=heavy)
+    assert next(iter(changed)) in cause.line_or_key
+    assert ("common factor" in cause.says) == ("youngs_modulus_Pa" in changed)
 
 
 def test_the_time_in_ms_is_named(fit):

@@ -40,8 +40,8 @@ class Number:
         Stiffness and mass go with these powers of it.
     units : tuple of (float, str)
         What it has to be multiplied by where it was written in a wrong unit, and in which.
-    dimensions : tuple of str
-        Those of its keys that are dimensions of a beam: on shear and rotary inertia the powers do not hold.
+    numbers : tuple of str
+        Its keys in a beam: on springs, point masses, shear and rotary inertia the powers do not hold.
     """
 
     key: str
@@ -49,7 +49,7 @@ class Number:
     stiffness_power: float
     mass_power: float
     units: tuple[tuple[float, str], ...]
-    dimensions: tuple[str, ...] = ()
+    numbers: tuple[str, ...] = ()
 
 
 PASCAL = ((1e9, "GPa"), (1e6, "MPa (N/mm^2)"), (1e3, "kPa"))
@@ -57,12 +57,26 @@ METRE = ((1e-3, "mm"), (1e-2, "cm"), (0.0254, "inches"))
 DENSITY = ((1e3, "g/cm^3"), (1e12, "t/mm^3"))
 NUMBERS = {
     "beam": (
-        Number(key="[beam] youngs_modulus_Pa", what="Young's modulus", stiffness_power=1, mass_power=0, units=PASCAL),
-        Number(key="[beam] density_kg_m3", what="the density", stiffness_power=0, mass_power=1, units=DENSITY),
+        Number(
+            key="[beam] youngs_modulus_Pa",
+            what="Young's modulus",
+            numbers=("youngs_modulus_Pa",),
+            stiffness_power=1,
+            mass_power=0,
+            units=PASCAL,
+        ),
+        Number(
+            key="[beam] density_kg_m3",
+            what="the density",
+            numbers=("density_kg_m3",),
+            stiffness_power=0,
+            mass_power=1,
+            units=DENSITY,
+        ),
         Number(
             key="[beam] thickness_m",
             what="the thickness",
-            dimensions=("thickness_m",),
+            numbers=("thickness_m",),
             stiffness_power=3,
             mass_power=1,
             units=METRE,
@@ -70,7 +84,7 @@ NUMBERS = {
         Number(
             key="[beam] width_m",
             what="the width",
-            dimensions=("width_m",),
+            numbers=("width_m",),
             stiffness_power=1,
             mass_power=1,
             units=METRE,
@@ -78,7 +92,7 @@ NUMBERS = {
         Number(
             key="[beam] length_m",
             what="the length",
-            dimensions=("length_m",),
+            numbers=("length_m",),
             stiffness_power=-3,
             mass_power=1,
             units=METRE,
@@ -86,7 +100,7 @@ NUMBERS = {
         Number(
             key="[beam] length_m, width_m, thickness_m",
             what="all dimensions",
-            dimensions=("length_m", "width_m", "thickness_m"),
+            numbers=("length_m", "width_m", "thickness_m"),
             stiffness_power=1,
             mass_power=3,
             units=METRE,
@@ -152,11 +166,21 @@ def wrong_units(situation: Situation) -> Iterator[Cause]:
     for number in numbers:
         for factor, unit in number.units:
             says = f"{number.what} seems to be written in {unit}: multiply it by {factor:g}"
-            cause = _scaled(situation, number, factor, says, -float(np.log(count)))
-            if cause.frequency_factor != 1.0:
-                says += f" (all frequencies are off by the common factor {cause.frequency_factor:.4g})"
-                cause = replace(cause, says=says)
-            yield cause if not number.dimensions else _rebuilt(cause, situation, number.dimensions, factor)
+            scaled = _scaled(situation, number, factor, says, -float(np.log(count)))
+            cause = _rebuilt(scaled, situation, number.numbers, factor) if number.numbers else scaled
+            common = scaled.frequency_factor
+            if common != 1.0 and _moves_all(cause, situation, common):
+                cause = replace(cause, says=f"{says} (all frequencies are off by the common factor {common:.4g})")
+            yield cause
+
+
+def _moves_all(cause: Cause, situation: Situation, factor: float) -> bool:
+    """Tell whether all frequencies go with one factor: not where springs or point masses stay as they are."""
+    if cause.computed is None:
+        return True
+    after, before = cause.computed.frequency_hz, situation.computed.frequency_hz
+    count = min(len(after), len(before))
+    return bool(np.all(np.abs(np.log(after[:count] / (factor * before[:count]))) < NEAR))
 
 
 def wrong_values(situation: Situation) -> Iterator[Cause]:
@@ -232,13 +256,13 @@ def _scaled(situation: Situation, number: Number, factor: float, says: str, log_
     )
 
 
-def _rebuilt(cause: Cause, situation: Situation, dimensions: tuple[str, ...], factor: float) -> Cause:
-    """Take the modes from a beam that is built with other dimensions; where there is none, the scaled ones stay."""
+def _rebuilt(cause: Cause, situation: Situation, numbers: tuple[str, ...], factor: float) -> Cause:
+    """Take the modes from a beam that is built with other numbers; where there is none, the scaled ones stay."""
     file = situation.model.source
     if not isinstance(file, BeamFile):
         return cause
-    beam = _resized(file.beam, dimensions, factor)
-    sections = tuple(_resized(section, dimensions, factor) for section in beam.section)
+    beam = _resized(file.beam, numbers, factor)
+    sections = tuple(_resized(section, numbers, factor) for section in beam.section)
     try:
         nominal = situation.model
         model = build_beam(replace(file, beam=replace(beam, section=sections))).with_ports(nominal.ports)
@@ -248,6 +272,6 @@ def _rebuilt(cause: Cause, situation: Situation, dimensions: tuple[str, ...], fa
     return replace(cause, computed=computed_modes(modes), frequency_factor=1.0, gain=1.0)
 
 
-def _resized(options: Sized, dimensions: tuple[str, ...], factor: float) -> Sized:
-    values = {name: getattr(options, name, None) for name in dimensions}
+def _resized(options: Sized, numbers: tuple[str, ...], factor: float) -> Sized:
+    values = {name: getattr(options, name, None) for name in numbers}
     return replace(options, **{name: value * factor for name, value in values.items() if value is not None})
