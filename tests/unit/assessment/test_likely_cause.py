@@ -266,6 +266,14 @@ def test_a_wrong_end_is_named():
     assert "[beam] left" in cause_of(pinned).line_or_key
 
 
+def test_a_beam_held_at_the_wrong_end_is_named_where_a_point_mass_stays_at_its_node():
+    """Points that are counted from the other end would count the mass so too."""
+    heavy, ends = [frf_ipz.BeamPointMass(node=6, mass_kg=0.05)], {"left": "sliding", "right": "free"}
+    fit = frf_ipz.fit_modes(measure(**ends, point_mass=heavy))
+    cause = cause_of(fit, left="free", right="sliding", point_mass=heavy)
+    assert "exchange left and right" in cause.says
+
+
 @pytest.mark.parametrize("length_m", [BEAM["length_m"], 1.05 * BEAM["length_m"]])
 def test_what_a_moved_sensor_is_worth_at_most_is_never_less_than_what_it_is_worth(fit, length_m):
     beam = frf_ipz.make_beam(**{**BEAM, "length_m": length_m})
