@@ -156,7 +156,8 @@ def update_model(
     if not chosen.expand or chosen.method != "minimal-change" or kept.status is UpdateStatus.NOTHING_TO_DO:
         return kept
     geometry = None if fe_model is None else fe_model.geometry
-    expanded = with_expanded_shapes(kept, fit, problem, geometry=geometry, options=chosen)
+    final = problem if kept.pairs is None else targets_of(kept.pairs, reduced_model)  # after pairing again
+    expanded = with_expanded_shapes(kept, fit, final, geometry=geometry, options=chosen)
     if expanded.expansion is None:
         return kept
     # what is said of a way back to the nominal model does not hold for measured shapes
