@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from frf_ipz.pairing.pairs import Pairs, PairVerdict
+from frf_ipz.updating import update as update_module
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.pairing_again import PairingAgain
 from frf_ipz.updating.parameters import make_structural_basis
@@ -38,6 +39,19 @@ def test_a_pole_that_was_undecided_becomes_a_target_under_its_nominal_name(case)
     assert len(updated.pairs.targets) == len(updated.before) == len(updated.after)
     own = [row.computed_value for row in updated.pairs.targets]
     assert np.max(np.abs(updated.before - own) / np.abs(own)) < 1e-6
+
+
+def test_measured_shapes_are_expanded_with_the_pairs_that_were_found_again(case, monkeypatch):
+    _, undecided = without_last_pole(case.pairs)
+    handed = []
+
+    def expand(updated, _fit, problem, **_options):
+        handed.append((len(updated.pairs.targets), len(problem.values)))
+        return updated
+
+    monkeypatch.setattr(update_module, "with_expanded_shapes", expand)
+    update(case, undecided)
+    assert [count for count, _ in handed] == [count for _, count in handed] != []
 
 
 def test_pairs_that_stand_are_left_alone(case):
