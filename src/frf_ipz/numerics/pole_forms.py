@@ -371,7 +371,7 @@ class DampedModel:
         """
         return [
             _damped_from_undamped(self.undamped, self.damped, output, force)
-            or _by_pencil(self.undamped.mass, self.damped.damping, self.undamped.stiffness, output, force)
+            or _by_pencil(self.undamped.mass, self._damping, self.undamped.stiffness, output, force)
             for output, force in zip(outputs, inputs, strict=True)
         ]
 
@@ -399,11 +399,8 @@ class DampedModel:
         with np.errstate(divide="ignore", invalid="ignore"):  # of a zero on a pole, or a double one
             weights = residues[frf] / (self.undamped.poles.real - squares[:, None]) ** 2
             shift = (weights @ rates) / weights.sum(axis=1) / 2
-        s = 1j * np.sqrt(squares)
-        s = np.where(s.imag < 0, -s, s)
-        is_real = np.abs(s.imag) <= REAL * np.abs(s)
-        frf = np.concatenate([frf, frf[is_real]])
-        start = np.concatenate([s, -s[is_real]]) - np.concatenate([shift, shift[is_real]])
+        start, place = _upper_starts(squares, shift)
+        frf = frf[place]
         values, is_found = self.damped.zeros(outputs[frf], inputs[frf], start)
         with np.errstate(invalid="ignore"):
             is_same = is_found & (np.abs(values - start) <= CLOSE * np.abs(start))
@@ -473,9 +470,9 @@ def every_damped_zero(
 
 
 def _by_pencil(
-    mass: FloatArray, damping: FloatArray | None, stiffness: FloatArray, output: FloatArray, force: FloatArray
+    mass: FloatArray, damping: FloatArray, stiffness: FloatArray, output: FloatArray, force: FloatArray
 ) -> Roots:
-    every = damped_zeros(mass, np.zeros_like(mass) if damping is None else damping, stiffness, output, force)
+    every = damped_zeros(mass, damping, stiffness, output, force)
     return every.take(np.flatnonzero(every.values.imag >= -REAL * np.abs(every.values)))
 
 
@@ -517,10 +514,7 @@ def _damped_from_undamped(undamped: PoleForm, damped: PoleForm, output: FloatArr
         return None
     squares = roots.values
     shift = np.sum(roots.left_vectors * (damped.damping @ roots.right_vectors), axis=0) / (2 * roots.slope)
-    s = 1j * np.sqrt(squares.astype(complex))
-    s = np.where(s.imag < 0, -s, s)
-    is_real = np.abs(s.imag) <= REAL * np.abs(s)
-    start = np.concatenate([s, -s[is_real]]) - np.concatenate([shift, shift[is_real]])
+    start, _ = _upper_starts(squares.astype(complex), shift)
     outputs, inputs = np.tile(output, (len(start), 1)), np.tile(force, (len(start), 1))
     values, is_found = damped.zeros(outputs, inputs, start)
     is_same = is_found & (np.abs(values - start) <= CLOSE * np.abs(start)) & (_gaps(values) >= MERGED)
@@ -533,6 +527,15 @@ def _damped_from_undamped(undamped: PoleForm, damped: PoleForm, output: FloatArr
         outputs, inputs = np.tile(output, (len(values), 1)), np.tile(force, (len(values), 1))
     roots, exact = damped.roots(outputs, inputs, values)
     return roots if exact.all() else None
+
+
+def _upper_starts(squares: ComplexArray, shift: ComplexArray) -> tuple[ComplexArray, IntArray]:
+    """Where zeros in s begin, those with an imaginary part of at least 0, and the squared zero that each is of."""
+    s = 1j * np.sqrt(squares)
+    s = np.where(s.imag < 0, -s, s)
+    is_real = np.abs(s.imag) <= REAL * np.abs(s)
+    place = np.concatenate([np.arange(len(s)), np.flatnonzero(is_real)])
+    return np.concatenate([s, -s[is_real]]) - shift[place], place
 
 
 def _repelled(

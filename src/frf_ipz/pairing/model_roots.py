@@ -145,8 +145,9 @@ def model_zeros(model: ReducedModel, labels: Sequence[FrfLabel], *, limit_rad_s:
         return []
     outputs = np.array([model.row(label.output_dof) for label in labels])
     inputs = np.array([model.row(label.input_dof) for label in labels])
-    by_poles = DampedModel.of(model.mass, model.damping, model.stiffness)
-    if by_poles is not None and np.isfinite(limit_rad_s):
+    has_limit = np.isfinite(limit_rad_s)
+    by_poles = DampedModel.of(model.mass, model.damping, model.stiffness) if has_limit else None
+    if by_poles is not None:
         # of a quadruple one may lie below the limit and the other above
         every = by_poles.zeros_up_to(outputs, inputs, limit_rad_s * (1 + MIRRORED))
         found = [_zeros_of(by_poles, *frf) for frf in zip(every, outputs, inputs, strict=True)]

@@ -14,6 +14,7 @@ from pathlib import Path
 import frf_ipz
 from frf_ipz.input_files import read_bytes
 
+CODE = {".py", ".js", ".css", ".html"}  # what computes, and what pages are made of
 PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "control")
 
 
@@ -40,7 +41,7 @@ def code_digest() -> str:
     """
     folder = Path(frf_ipz.__file__).parent
     content = hashlib.sha256()
-    for path in sorted(path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pyc"):
+    for path in sorted(path for path in folder.rglob("*") if path.suffix in CODE):
         content.update(path.relative_to(folder).as_posix().encode() + b"\0" + read_bytes(path) + b"\0")
     return content.hexdigest()
 

@@ -117,9 +117,7 @@ class TargetRoots:
         """
         if not frfs:
             return []
-        pairs = [self.rows[number] for number in frfs]
-        outputs, inputs = (np.array([pair[side] for pair in pairs]) for side in range(2))
-        return every_damped_zero(mass, damping, stiffness, outputs, inputs)
+        return every_damped_zero(mass, damping, stiffness, *self._rows_of(frfs))
 
     def zeros_up_to(
         self, limit_rad_s: float, frfs: list[int], mass: FloatArray, damping: FloatArray, stiffness: FloatArray
@@ -144,9 +142,12 @@ class TargetRoots:
         if model is None:
             every = self.every_zero(frfs, mass, damping, stiffness)
             return [roots.values[np.abs(roots.values) <= limit_rad_s] for roots in every]
-        pairs = [self.rows[number] for number in frfs]
-        outputs, inputs = (np.array([pair[side] for pair in pairs]) for side in range(2))
-        return model.zeros_up_to(outputs, inputs, limit_rad_s)
+        return model.zeros_up_to(*self._rows_of(frfs), limit_rad_s)
+
+    def _rows_of(self, frfs: list[int]) -> tuple[FloatArray, FloatArray]:
+        """Rows of sensors and of excitations of some FRFs, (n_frfs, r) each."""
+        outputs, inputs = zip(*(self.rows[number] for number in frfs), strict=True)
+        return np.array(outputs), np.array(inputs)
 
     def near(self, form: PoleForm, start: ComplexArray, targets: IntArray) -> tuple[Roots, BoolArray]:
         """Find zeros from near.

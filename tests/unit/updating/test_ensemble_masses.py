@@ -18,7 +18,7 @@ def test_members_without_a_positive_mass_come_nearer_to_the_mean_and_the_others_
     monkeypatch.setattr(ensemble, "unwhiten", lambda _terms, _scales, whitened: whitened)
     mean = np.array([1.0, 2.0])
     drawn = np.array([[0.9, 2.1], [-0.5, 2.0], [1.0, -60.0]])
-    members = ensemble._with_positive_mass(posterior_of_masses(mean), drawn)
+    members, *_ = ensemble._with_positive_mass(posterior_of_masses(mean), drawn)
     np.testing.assert_array_equal(members[0], drawn[0])
     np.testing.assert_allclose(members[1], [0.25, 2.0])
     np.testing.assert_allclose(members[2], [1.0, 2.0 - 62.0 / 32.0])

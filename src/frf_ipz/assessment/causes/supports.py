@@ -57,10 +57,8 @@ def other_supports(situation: Situation) -> Iterator[Cause]:
 
 def _modes_with(situation: Situation, ends: Mapping[str, tuple[str, ...]]) -> ComputedModes | None:
     """Compute the modes with other supports; None where a measured DOF would be held."""
-    model, needed = (
-        situation.model,
-        {dof for label in situation.measured.labels for dof in (label.output_dof, label.input_dof)},
-    )
+    model, labels = situation.model, situation.measured.labels
+    needed = {dof for label in labels for dof in (label.output_dof, label.input_dof)}
     try:
         for end, held in ends.items():
             model = _with_end(model, int(model.geometry.nodes[ENDS[end]]), held)

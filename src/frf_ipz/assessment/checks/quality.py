@@ -34,8 +34,8 @@ def fit(evidence: Evidence) -> Iterator[Check]:
     misfit = evidence.fit.misfit
     if "ratio" not in misfit or not np.isfinite(misfit["ratio"]).any():
         return
-    ratios = misfit["ratio"].to_numpy(float)
-    costs = (ratios > WORST_MISFIT) & (_misfit_db(evidence) > SIXTH * GAIN_MARGIN_DB)
+    ratios, sizes_db = misfit["ratio"].to_numpy(float), _misfit_db(evidence)
+    costs = (ratios > WORST_MISFIT) & (sizes_db > SIXTH * GAIN_MARGIN_DB)
     worst = int(np.nanargmax(np.where(costs, ratios, -1.0) if costs.any() else ratios))
     row, ratio = misfit.iloc[worst], float(ratios[worst])
     where = f"{row['output_dof']} / {row['input_dof']}"
@@ -46,7 +46,7 @@ def fit(evidence: Evidence) -> Iterator[Check]:
         limit=WORST_MISFIT,
         unit="noise",
         where=where,
-        says=f"the fit leaves {ratio:.2g} times the noise of {where}, {_misfit_db(evidence)[worst]:.2g} dB of it; "
+        says=f"the fit leaves {ratio:.2g} times the noise of {where}, {sizes_db[worst]:.2g} dB of it; "
         "1 is all that the measurement can tell",
         advice="narrow [fit] band_hz, or look at the recordings of that FRF" if costs.any() else "",
     )

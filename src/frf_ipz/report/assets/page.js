@@ -116,6 +116,7 @@
   // Names beside bars leave room for the bars.
   function shortNames({ ticktext, tickvals }, figure) {
     const names = ticktext || [...new Set(pictureIn(figure).data.flatMap(({ y }) => (Array.isArray(y) ? y : [])))];
+    if (!names.length) return {};
     const most = figure.querySelector(".plot").clientWidth * MOST_FOR_NAMES;
     return { tickvals: tickvals || names, ticktext: names.map((name) => inTwoLines(name, most)) };
   }

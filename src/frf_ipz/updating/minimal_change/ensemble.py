@@ -81,9 +81,7 @@ def _draw_stiffness(
     posterior: Posterior, rng: np.random.Generator, count: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     phase, result = posterior.stiffness, posterior.stiffness_result
-    whitened = _with_positive_mass(posterior, _draw(result, rng, count))
-    theta = unwhiten(phase.terms, result.scales[:-1], whitened)
-    mass, stiffness = phase.matrices(theta)
+    whitened, theta, mass, stiffness = _with_positive_mass(posterior, _draw(result, rng, count))
     # the poles predicted by the linear step are imposed: far from the mean, second-order terms would blur them
     poles = np.flatnonzero(phase.target_roots.frf < 0)
     sensitivity = np.empty((len(poles), result.linear.ends[-1] - result.linear.ends[0]))
@@ -101,19 +99,24 @@ def _draw_stiffness(
     return theta, mass, _with_poles(mass, stiffness, shapes, squares, n_negative)
 
 
-def _with_positive_mass(posterior: Posterior, whitened: FloatArray) -> FloatArray:
-    """Bring members whose mass no machine has, as those of a model that is far off, half way nearer to the mean."""
+def _with_positive_mass(
+    posterior: Posterior, whitened: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Bring members whose mass no machine has, as those of a model that is far off, half way nearer to the mean.
+
+    Gives whitened parameters, parameters, mass and stiffness of all.
+    """
     phase, result = posterior.stiffness, posterior.stiffness_result
     mean = result.step.mean
-    is_far = np.ones(len(whitened), bool)
-    for _ in range(MOST_HALVINGS):
-        mass, _ = phase.matrices(unwhiten(phase.terms, result.scales[:-1], whitened[is_far]))
+    for number in range(MOST_HALVINGS + 1):
+        theta = unwhiten(phase.terms, result.scales[:-1], whitened)
+        mass, stiffness = phase.matrices(theta)
         values = np.linalg.eigvalsh(mass)
-        is_far[is_far] = values[:, 0] <= np.finfo(float).eps * values.shape[1] * values[:, -1]
-        if not is_far.any():
+        is_far = values[:, 0] <= np.finfo(float).eps * values.shape[1] * values[:, -1]
+        if not is_far.any() or number == MOST_HALVINGS:
             break
         whitened = np.where(is_far[:, None], mean + (whitened - mean) / 2, whitened)
-    return whitened
+    return whitened, theta, mass, stiffness
 
 
 def _draw(result: PhaseResult, rng: np.random.Generator, count: int) -> FloatArray:
