@@ -23,6 +23,13 @@ def residual(squares, rates, poles, vectors):
     return np.abs(forces).max(axis=0) / np.abs(squares[:, None] * vectors).max(axis=0)
 
 
+def assert_receptance(squares, rates, poles, vectors, left_vectors):
+    for s in (50j, 650j, 3000j):
+        exact = np.linalg.inv(s**2 * np.eye(len(squares)) + s * rates + np.diag(squares))
+        found = (vectors / (s - poles)) @ left_vectors.T + (vectors.conj() / (s - poles.conj())) @ left_vectors.conj().T
+        assert_allclose(found, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
+
+
 @pytest.mark.parametrize(("coupling", "closest"), [(0.0, 1.0), (0.3, 1.0), (0.3, 1e-3), (0.3, 0.0), (30.0, 1.0)])
 def test_poles_are_those_of_the_eigenvalue_problem(coupling, closest):
     squares, rates = model(coupling=coupling, closest=closest)
@@ -65,7 +72,11 @@ def test_roots_that_repeat_and_modes_without_damping_give_the_receptance(couplin
     rates[7, 7] = rates[6, 6] = max(rates[6, 6], rates[6, 7])
     poles, vectors, left_vectors = damped_modes(squares, rates)
     left_vectors = left_vectors * np.where(poles.imag > 0, 1.0, 0.5)
-    for s in (50j, 650j, 3000j):
-        exact = np.linalg.inv(s**2 * np.eye(order) + s * rates + np.diag(squares))
-        found = (vectors / (s - poles)) @ left_vectors.T + (vectors.conj() / (s - poles.conj())) @ left_vectors.conj().T
-        assert_allclose(found, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
+    assert_receptance(squares, rates, poles, vectors, left_vectors)
+
+
+def test_modes_that_are_found_by_iteration_give_the_receptance(monkeypatch):
+    squares, rates = model(coupling=0.3)
+    monkeypatch.setattr(module, "_by_eigenvalues", None)
+    poles, vectors, left_vectors = damped_modes(squares, rates)
+    assert_receptance(squares, rates, poles, vectors, left_vectors)
