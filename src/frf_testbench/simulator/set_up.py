@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,7 @@ QUANTITIES = {  # unit, SI value of the unit, power of s that makes it from a di
 }
 ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 LONGEST_CONTACT = 1.7  # of a hammer's tip, times the upper edge of the band
+LEAST_REACH = 1e-6  # of a mode's largest receptance, between a force and a motion: less is the error of arithmetic
 MARGIN = 0.3  # sensors and excited points sit where some mode moves at least this much of its largest motion
 
 
@@ -159,6 +161,33 @@ def select_moving_nodes(structure: Structure, modes: Modes, band: tuple[float, f
     shapes = np.array([structure.row(Point(node, structure.direction)) for node in nodes]) @ modes.shapes[:, inside]
     best = (np.abs(shapes) / np.abs(shapes).max(axis=0)).max(axis=1)
     return [node for node, value in zip(nodes, best.tolist(), strict=True) if value > margin]
+
+
+def is_reached(structure: Structure, modes: Modes, set_up: SetUp) -> bool:
+    """Whether some force of a test moves each of its sensors and points of interest in some mode of the band.
+
+    Parameters
+    ----------
+    structure, modes
+        The specimen without scatter.
+    set_up : SetUp
+        A test of it.
+
+    Returns
+    -------
+    bool
+        False where a motion has no part in what the forces excite, as in the other plane of a symmetric frame.
+    """
+    inside = (modes.frequencies_hz >= set_up.band_hz[0]) & (modes.frequencies_hz <= set_up.band_hz[1])
+
+    def shapes_at(nodes: Iterable[int]) -> FloatArray:
+        return np.array([structure.row(Point(node, structure.direction)) for node in nodes]) @ modes.shapes[:, inside]
+
+    largest = np.abs(shapes_at(structure.nodes)).max(axis=0)
+    motions = shapes_at((*(sensor.node for sensor in set_up.sensors), *set_up.points)) / largest
+    forces = shapes_at(node for node, _ in set_up.excited_points) / largest
+    reach = np.abs(motions[:, None] * forces).max(axis=(1, 2))
+    return bool(reach.min() > LEAST_REACH)
 
 
 def draw_set_up(

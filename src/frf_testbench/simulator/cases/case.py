@@ -36,7 +36,7 @@ from frf_testbench.simulator.cases.system import TrueSystem, build_system
 from frf_testbench.simulator.cases.truth import GENERATOR, compute_point_frfs, describe_case, estimate_frf
 from frf_testbench.simulator.effects.catalogue import depends_on_level, draw_effects, select_effects
 from frf_testbench.simulator.effects.effect import Effect, EffectTarget
-from frf_testbench.simulator.set_up import MARGIN, SetUp, draw_set_up, select_moving_nodes
+from frf_testbench.simulator.set_up import MARGIN, SetUp, draw_set_up, is_reached, select_moving_nodes
 from frf_testbench.simulator.signals.channels import Noise
 from frf_testbench.simulator.signals.receptance import solve_modes
 from frf_testbench.simulator.specimens import KINDS, Specimen, draw_specimen
@@ -165,12 +165,14 @@ def make_case(seed: int, effect: str = "null", *, structure: str | None = None, 
 
 
 def _prepare(rng: np.random.Generator, kind: str, names: tuple[str, ...]) -> _PreparedTest | None:
-    """Draw a specimen and its test; None where its nominal model is too coarse for the band."""
+    """Draw a specimen and its test; None where its nominal model is too coarse, or no force moves a sensor."""
     thick = "shear_rotary_inertia" in names
     specimen = draw_specimen(rng, kind, thick_euler=thick)
     drawn = specimen.build()
     modes = solve_modes(drawn)
     set_up = draw_set_up(rng, specimen, drawn, modes, levels=depends_on_level(names))
+    if not is_reached(drawn, modes, set_up):
+        return None
     nominal_model = specimen.build_nominal_model()
     nominal_hz = solve_modes(nominal_model.structure()).frequencies_hz
     inside = np.flatnonzero((modes.frequencies_hz >= set_up.band_hz[0]) & (modes.frequencies_hz <= set_up.band_hz[1]))

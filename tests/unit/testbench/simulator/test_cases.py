@@ -374,3 +374,11 @@ def test_many_truths_without_scatter_are_their_nominal_models(kind):
 @pytest.mark.slow
 def test_a_law_that_runs_away_at_twice_the_step_is_drawn_again():
     assert make_case(RUNS_AWAY, "gap_contact", analyse=False).truth["attempt"] > 0
+
+
+def test_no_sensor_sits_where_the_forces_move_nothing() -> None:
+    case = make_case(940009, analyse=False)  # the first test drawn has both sensors on the still rail of a grid
+    frequencies_hz = np.linspace(*case.system.set_up.band_hz, 200)
+    largest = np.abs(case.base_system.measured_frf(frequencies_hz)).max(axis=(0, 2))
+    assert case.truth["attempt"] > 0
+    assert largest.min() > 1e-5 * largest.max()
