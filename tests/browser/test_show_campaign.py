@@ -8,7 +8,7 @@ from frf_ipz.pipeline.run import run_pipeline
 from served_page import PLACE_OF_NODE, Page, served
 from synthetic_campaign import hammer_campaign
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 def write_campaign(folder, *names):

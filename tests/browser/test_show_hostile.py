@@ -104,6 +104,7 @@ def test_the_page_itself_does_not_run_a_script_of_the_results(browser, folder):
     browser.get_log("browser")
 
 
+@pytest.mark.slow
 def test_the_report_of_the_program_is_drawn_in_its_sandbox(browser, demo):
     with served(demo / "out") as address:
         page = Page(browser, address)
@@ -114,6 +115,7 @@ def test_the_report_of_the_program_is_drawn_in_its_sandbox(browser, demo):
         assert not page.errors()
 
 
+@pytest.mark.slow
 def test_hostile_names_in_a_campaign_are_text_and_ask_for_nothing(browser, demo, tmp_path):
     copy_demo(demo, tmp_path)
     name = "<img src=x onerror='window.hacked = 1'>{{7*7}}"

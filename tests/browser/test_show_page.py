@@ -54,6 +54,7 @@ def test_every_picture_draws(page):
     assert all(drawn)
 
 
+@pytest.mark.slow
 def test_a_pole_rejected_in_the_diagram_is_gone_and_stays_gone_on_the_command_line(page, demo, tmp_path):
     assert is_there(demo / "out", REJECTED_HZ)
     comment = (demo / "pipeline.toml").read_text(encoding="utf-8").splitlines()[0]
@@ -81,6 +82,7 @@ def test_a_pole_rejected_in_the_diagram_is_gone_and_stays_gone_on_the_command_li
     assert is_there(demo / "out", REJECTED_HZ)
 
 
+@pytest.mark.slow
 def test_a_pole_is_added_with_its_reason(page, demo):
     page.write("#pole-form", hz=f"{ADDED_HZ:g}", why="seen by eye")
     before = page.stamp()
@@ -103,6 +105,7 @@ def test_every_mode_of_the_fit_has_a_handle_to_click(page, demo):
     assert min(abs(float(page.value("#pole-form", "hz")) / hertz - 1) for hertz in poles(demo / "out")) < 1e-5
 
 
+@pytest.mark.slow
 def test_a_range_that_is_dragged_over_is_left_out(page, demo):
     page.click("[data-drag=select]")
     page.show("#stabilisation")
@@ -121,6 +124,7 @@ def test_a_range_that_is_dragged_over_is_left_out(page, demo):
     assert page.find("[data-drag=select]").get_attribute("aria-pressed") == "true"
 
 
+@pytest.mark.slow
 def test_zooming_in_brings_all_lines_of_the_frfs(page, demo):
     lines = pq.read_table(
         demo / "out" / "frf.parquet", filters=[("frequency_hz", ">", 299.9), ("frequency_hz", "<", 303.1)]
@@ -141,6 +145,7 @@ def test_zooming_in_brings_all_lines_of_the_frfs(page, demo):
     assert page.run(ASKED) <= 3  # once for the view, once for the theme, and a linked axis may follow late
 
 
+@pytest.mark.slow
 def test_a_record_is_dropped(page, demo):
     page.click("#record-choices summary")
     before = page.stamp()
@@ -154,6 +159,7 @@ def test_a_record_is_dropped(page, demo):
     assert page.find("[data-record='hits/p69_02.csv']").get_attribute("value") == "drop"
 
 
+@pytest.mark.slow
 def test_a_point_picked_on_the_drawing_is_predicted(page, demo):
     page.show("#structure")
     page.click_at(page.run(PLACE_OF_NODE, "nodes", "node 33"))
@@ -164,6 +170,7 @@ def test_a_point_picked_on_the_drawing_is_predicted(page, demo):
     assert "33:+z" in pq.read_table(demo / "out" / "poi_frf.parquet")["output_dof"].to_pylist()
 
 
+@pytest.mark.slow
 def test_nodes_picked_on_the_drawing_are_what_the_model_is_reduced_to(page, demo):
     before = page.value("#reduce-form", "dofs").split()
     page.show("#structure")
@@ -183,6 +190,7 @@ def test_nodes_picked_on_the_drawing_are_what_the_model_is_reduced_to(page, demo
     assert "reduced to" in page.find("#choices").text
 
 
+@pytest.mark.slow
 def test_what_the_run_refuses_is_said_and_taken_back(page, demo):
     text = (demo / "pipeline.toml").read_bytes()
     page.write("#point-form", dof="4711:+z")
@@ -192,6 +200,7 @@ def test_what_the_run_refuses_is_said_and_taken_back(page, demo):
     assert (demo / "pipeline.toml").read_bytes() == text
 
 
+@pytest.mark.slow
 def test_a_rejection_without_a_reason_is_refused(page, demo):
     text = (demo / "pipeline.toml").read_bytes()
     page.write("#pole-form", hz="100")

@@ -15,7 +15,7 @@ from frf_ipz.runs.results import open_results
 from hostile_run import HOSTILE
 from served_page import Page, served
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 NEAR = 0.02  # relative: what a pixel is on the axis
 
 LEGEND = """

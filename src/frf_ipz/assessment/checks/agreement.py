@@ -53,7 +53,7 @@ def amplitude(evidence: Evidence) -> Iterator[Check]:
         where=deviation.frf,
         says=f"the model is off the measured FRF {deviation.where} (median): {deviation.figures}{relative}; half of a "
         f"gain margin of {GAIN_MARGIN_DB:g} dB is the most that a controller can bear",
-        advice="" if after <= SIXTH * GAIN_MARGIN_DB else "compare model and measurement there; see the likely cause",
+        advice="" if after <= SIXTH * GAIN_MARGIN_DB else "compare model and measurement there",
     )
 
 
