@@ -175,7 +175,18 @@ def test_a_mode_without_counterpart_is_harmless_where_the_model_meets_the_frfs(e
 
 def test_zeros_that_the_model_lacks_are_seen(evidence):
     assert the(counterparts.zeros, evidence).verdict is USABLE
-    assert the(counterparts.zeros, without_counterpart(evidence, "zero", 100)).verdict is WITH_CARE
+    check = the(counterparts.zeros, without_counterpart(with_modes_elsewhere(evidence, 3), "zero", 100))
+    assert check.verdict is WITH_CARE
+    assert check.advice
+
+
+def test_zeros_without_counterpart_are_harmless_where_the_model_meets_their_frfs(evidence):
+    """As zeros far from the imaginary axis, which depend on the smallest changes and hardly show."""
+    check = the(counterparts.zeros, without_counterpart(evidence, "zero", 100))
+    assert check.verdict is USABLE
+    assert check.advice == ""
+    assert check.figure == 0.0
+    assert "all the same" in check.says
 
 
 @pytest.mark.parametrize(("factor", "verdict"), [(1.0, USABLE), (1.05, WITH_CARE), (1.2, WITH_CARE), (2.0, NOT_USABLE)])
