@@ -39,6 +39,7 @@ def test_few_modes_become_targets_of_another_one(runs):
     assert np.mean([is_right(run, pair) for run, pair in targets]) >= SURE
 
 
+@pytest.mark.slow
 def test_the_update_is_better_than_the_nominal_model_and_its_bands_hold_the_truth(runs):
     after, before = ([run.error_db(getattr(run.prediction, name)) for run in runs] for name in ("values", "nominal"))
     assert np.median(after) < 0.5 * np.median(before)

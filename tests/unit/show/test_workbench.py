@@ -26,6 +26,7 @@ def frequencies(folder):
     return pq.read_table(folder / "poles.parquet")["frequency_hz"].to_pylist()
 
 
+@pytest.mark.slow
 def test_a_rejected_pole_is_gone_and_the_command_line_repeats_it(demo, tmp_path):
     out, pipeline = demo / "out", demo / "pipeline.toml"
     before, text = frequencies(out), pipeline.read_text(encoding="utf-8")

@@ -55,7 +55,9 @@ def localised(chain, strike):
 
 
 @pytest.mark.parametrize(
-    "name", ["cubic", "gap", pytest.param("outside the catalogue", marks=pytest.mark.slow)], ids=str
+    "name",
+    ["cubic", *(pytest.param(name, marks=pytest.mark.slow) for name in ("gap", "outside the catalogue"))],
+    ids=str,
 )
 def test_a_force_is_localised_whatever_its_law(localised, name):
     location = LAWS[name][2]
@@ -110,7 +112,8 @@ def test_a_single_sensor_localises_nothing(chain, strike):
 
 
 @pytest.mark.parametrize(
-    ("name", "law", "strength", "shape"), [("cubic", CubicStiffness(), 2e10, 0.0), ("gap", GapContact(), 3e4, 2e-4)]
+    ("name", "law", "strength", "shape"),
+    [("cubic", CubicStiffness(), 2e10, 0.0), pytest.param("gap", GapContact(), 3e4, 2e-4, marks=pytest.mark.slow)],
 )
 def test_the_parameters_of_a_law_are_read_from_the_free_force(localised, name, law, strength, shape):
     segments, linear, localisation = localised(name)
@@ -120,7 +123,8 @@ def test_the_parameters_of_a_law_are_read_from_the_free_force(localised, name, l
     assert np.isfinite(start.nuisance).all()
 
 
-@pytest.mark.parametrize("far_off", [pytest.param(True, marks=pytest.mark.slow), False])
+@pytest.mark.slow
+@pytest.mark.parametrize("far_off", [True, False])
 def test_a_law_that_the_alternating_fit_loses_is_simulated_as_read_from_the_free_force(localised, monkeypatch, far_off):
     segments, linear, localisation = localised("gap")
     problem = LawFitProblem(segments=segments, linear=linear, localisation=localisation)

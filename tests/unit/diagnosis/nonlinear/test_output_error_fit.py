@@ -72,7 +72,7 @@ def test_the_shape_at_the_location_of_a_law_is_fitted(cubic):
     assert abs(fixed.strength - K3) > CERTAIN * np.sqrt(fixed.covariance[0, 0])
 
 
-@pytest.mark.parametrize("size", [1e200, np.inf])
+@pytest.mark.parametrize("size", [pytest.param(1e200, marks=pytest.mark.slow), np.inf])
 def test_derivatives_that_diverge_are_set_to_zero(cubic, monkeypatch, size):
     """Of a stiff stop, say: the derivative grows from contact to contact until it overflows."""
     segments, nuisance_prior, location = cubic

@@ -60,6 +60,7 @@ def test_data_that_are_better_than_guessed_distinguish_locations(problem, monkey
     assert rescored.cost == pytest.approx(right.cost, abs=0.1 * right.n_rows)
 
 
+@pytest.mark.slow
 def test_a_fit_without_a_rival_stays_unchanged(problem):
     fits = [SimpleNamespace(cost=100.0, n_rows=200), SimpleNamespace(cost=150.0, n_rows=200)]
     contenders, behind = rescore(problem, fits)
