@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 # Of linear algebra: on small matrices more than one only wait for each other.
 THREADS = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
+NO_PLUGINS = "PYDANTIC_DISABLE_PLUGINS", "__all__"  # looking for some reads the metadata of all installed packages
 SIGNALS = "SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"  # each system has some of them
 STOPPED = "stopped; results are those of the last command that came to its end"
 PAUSE_S = 0.01  # what drops an exception has gone on by then
@@ -89,6 +90,7 @@ def main() -> None:
 def _run() -> None:
     for name in THREADS:  # NumPy reads them when it is loaded, by the command; what the user has chosen stays
         os.environ.setdefault(name, "1")
+    os.environ.setdefault(*NO_PLUGINS)
     from frf_ipz.cli.commands import app
     from frf_ipz.cli.printing import guard_streams, say_error
     from frf_ipz.errors import FrfIpzError, NumericalError

@@ -10,6 +10,7 @@ import numpy as np
 
 from frf_ipz.arguments import require_type
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, read_only, require_shape
+from frf_ipz.diagnosis.options import WITHOUT_FRFS
 from frf_ipz.display import Concise
 from frf_ipz.dofs import AnyDof
 from frf_ipz.errors import InputError
@@ -25,11 +26,6 @@ if TYPE_CHECKING:
     from frf_ipz.ingest import records as recorded
 
 BLOCK = 128  # samples
-WITHOUT_FRFS = (
-    "a diagnosis compares FRFs, and a test of kind 'modes' has none: masses, springs and joints that are missing, what "
-    "depends on the level, gains and delays of sensors cannot be told from modes; 'run' says which modes have no "
-    "counterpart in the model; measure FRFs, or take [diagnose] apply out"
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

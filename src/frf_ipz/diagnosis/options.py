@@ -12,6 +12,12 @@ from frf_ipz.toml_files import STRICT, check_values
 if TYPE_CHECKING:
     from pathlib import Path
 
+WITHOUT_FRFS = (
+    "a diagnosis compares FRFs, and a test of kind 'modes' has none: masses, springs and joints that are missing, what "
+    "depends on the level, gains and delays of sensors cannot be told from modes; 'run' says which modes have no "
+    "counterpart in the model; measure FRFs, or take [diagnose] apply out"
+)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiagnoseOptions:

@@ -11,17 +11,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
-from scipy.spatial import Delaunay, QhullError
 
 from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.beam_models import deflection_row
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from scipy import spatial
+
     from frf_ipz.structure import StructuralModel
+else:
+    spatial = import_late("scipy.spatial")
 
 AXES = ("x", "y", "z")
 PRINTED = (
@@ -139,8 +143,8 @@ def _interval(positions: FloatArray, here: float) -> tuple[IntArray, FloatArray]
 
 def _simplex(positions: FloatArray, here: FloatArray) -> tuple[IntArray, FloatArray]:
     try:
-        mesh = Delaunay(positions)
-    except QhullError:
+        mesh = spatial.Delaunay(positions)
+    except spatial.QhullError:
         raise InputError("the nodes span no mesh in which a point could lie; give 'dofs' with weights") from None
     found = int(mesh.find_simplex(here, tol=PRINTED))
     if found < 0:

@@ -6,15 +6,21 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.arguments import require_type
 from frf_ipz.ingest.campaign import VibrationTest
-from frf_ipz.ingest.estimation.frf_files import estimate_frf_files
-from frf_ipz.ingest.estimation.hammer import estimate_hammer
-from frf_ipz.ingest.estimation.modes import hand_on_modes
-from frf_ipz.ingest.estimation.random import estimate_random
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.late_imports import import_late
 from frf_ipz.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from frf_ipz.ingest.estimation.frf_files import estimate_frf_files
+    from frf_ipz.ingest.estimation.hammer import estimate_hammer
+    from frf_ipz.ingest.estimation.modes import hand_on_modes
+    from frf_ipz.ingest.estimation.random import estimate_random
     from frf_ipz.ingest.frf_estimate import FrfEstimate
+else:
+    estimate_frf_files = import_late("frf_ipz.ingest.estimation.frf_files", "estimate_frf_files")
+    estimate_hammer = import_late("frf_ipz.ingest.estimation.hammer", "estimate_hammer")
+    estimate_random = import_late("frf_ipz.ingest.estimation.random", "estimate_random")
+    hand_on_modes = import_late("frf_ipz.ingest.estimation.modes", "hand_on_modes")
 
 KINDS = {"hammer": estimate_hammer, "random": estimate_random, "frf": estimate_frf_files, "modes": hand_on_modes}
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frf_ipz.diagnosis.observations import WITHOUT_FRFS
+from frf_ipz.diagnosis.options import WITHOUT_FRFS
 from frf_ipz.errors import InputError
 from frf_ipz.late_imports import import_late
 from frf_ipz.pipeline.stage_runner import StageRunner

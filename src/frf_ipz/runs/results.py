@@ -13,11 +13,8 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 from frf_ipz.arguments import as_path
 from frf_ipz.display import PICTURES, REPORT
 from frf_ipz.errors import FileFormatError, FrfIpzError, InputError, did_you_mean
-from frf_ipz.export.frames import FRAMES, as_frame
-from frf_ipz.export.run_tables import pair_table
-from frf_ipz.export.state_space import to_control
+from frf_ipz.late_imports import import_late
 from frf_ipz.runs.folder import SupersededError, read_run
-from frf_ipz.runs.summary import summarise
 from frf_ipz.structure import StructuralModel
 
 if TYPE_CHECKING:
@@ -31,14 +28,20 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.measured.levels import LevelDependence
     from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.dofs import AnyDof
-    from frf_ipz.export.state_space import StateSpaceModel
+    from frf_ipz.export import frames, run_tables
+    from frf_ipz.export.state_space import StateSpaceModel, to_control
     from frf_ipz.frf import FrfLabel, FrfSet
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.prediction.prediction import Prediction
+    from frf_ipz.runs.summary import summarise
     from frf_ipz.structure import Geometry, ReducedModel
     from frf_ipz.updating.updated_model import UpdatedModel
+else:
+    frames, run_tables = import_late("frf_ipz.export.frames"), import_late("frf_ipz.export.run_tables")
+    summarise = import_late("frf_ipz.runs.summary", "summarise")
+    to_control = import_late("frf_ipz.export.state_space", "to_control")
 
 
 INCONSISTENT = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RecursionError)
@@ -174,11 +177,11 @@ class Results:
         """
         named = ("estimate", "fit", "pairs", "updated_model", "prediction", "diagnosis", "assessment")
         results = [getattr(self, name) for name in named]
-        tables = {name: result for result in results if result is not None for name in FRAMES[type(result)]}
+        tables = {name: result for result in results if result is not None for name in frames.FRAMES[type(result)]}
         if table not in tables:
             raise InputError(f"{self.name} has no table '{table}'; {did_you_mean(table, list(tables))}")
         if table == "pairs" and self.pairs is not None and self.updated_model is not None:
-            return as_frame(pair_table(self.pairs, self.updated_model.after))
+            return frames.as_frame(run_tables.pair_table(self.pairs, self.updated_model.after))
         frame: pd.DataFrame = tables[table].to_frame(table)
         return frame
 

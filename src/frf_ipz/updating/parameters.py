@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from frf_ipz.arguments import require_type
 from frf_ipz.arrays import BoolArray, FloatArray, require_shape
@@ -378,7 +377,7 @@ def _distance_terms(regions: tuple[Region, ...], scale: float, what: str) -> tup
     """One factor for all, and fields whose correlation falls off as exp(-distance / length): they may jump."""
     positions = np.array([region.coordinates_m for region in regions])
     extent = max(float(np.ptp(positions, axis=0).max()), np.finfo(float).tiny)
-    distance = cdist(positions, positions) / extent
+    distance = np.sqrt(sum(np.subtract.outer(axis, axis) ** 2 for axis in positions.T)) / extent
     terms = [PriorTerm(name=f"a factor on the {what}", root=np.ones((len(regions), 1)), std=GLOBAL_STD * scale)]
     for length in SEGMENT_LENGTHS:
         correlation = np.exp(-distance / length) + SAME_POSITION * np.eye(len(regions))

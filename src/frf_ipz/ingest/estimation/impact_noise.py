@@ -23,16 +23,20 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import gammainccinv
 
 from frf_ipz.ingest.estimation.variance import frf_variance
 from frf_ipz.ingest.signals.faults import MOST_MISSING
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from scipy import special
+
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
     from frf_ipz.ingest.estimation.spectra import SpectrumSums
+else:
+    special = import_late("scipy.special")
 
 CHANCE = 1e-6  # share of lines without a force that are taken for one with
 LEAST_FORCE = 1e-5  # of its largest power, 50 dB: a force that was cut to its pulse does not show its own noise
@@ -129,7 +133,7 @@ def without_force_noise(sums: SpectrumSums, noise: ImpactNoise) -> FloatArray:
         Sum of the squared moduli of the force itself; 0 where it does not stand out from the noise.
     """
     counts = np.maximum(sums.counts, 1)[:, None]
-    is_known = sums.force > noise.force * gammainccinv(counts, CHANCE) / counts
+    is_known = sums.force > noise.force * special.gammainccinv(counts, CHANCE) / counts
     return np.asarray(np.where(noise.force > 0.0, np.where(is_known, sums.force - noise.force, 0.0), sums.force))
 
 

@@ -5,10 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
+    from scipy import fft
+
     from frf_ipz.arrays import FloatArray
+else:
+    fft = import_late("scipy.fft")
 
 DIFFERENT = 0.01  # of the mean square: the same force again differs by noise and by the shaker's own distortion
 CHANGED = 0.5  # of the mean square
@@ -39,8 +44,8 @@ def find_period(force: FloatArray) -> int:
     lags = np.arange(SHORTEST, n_samples // 2 + 1)
     if not len(lags) or not np.any(signal):
         return 0
-    padded = next_fast_len(2 * n_samples, real=True)
-    correlation = irfft(np.abs(rfft(signal, padded)) ** 2, padded)[lags]
+    padded = fft.next_fast_len(2 * n_samples, real=True)
+    correlation = fft.irfft(np.abs(fft.rfft(signal, padded)) ** 2, padded)[lags]
     power = np.concatenate([[0.0], np.cumsum(signal**2)])
     both = power[n_samples - lags] + power[-1] - power[lags]  # of the signal without its end, and without its start
     difference = 1.0 - 2.0 * correlation / np.where(both > 0.0, both, np.inf)

@@ -15,10 +15,17 @@ chapter 2, for the distribution.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.special import gammainccinv
 
 from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.late_imports import import_late
+
+if TYPE_CHECKING:
+    from scipy import special
+else:
+    special = import_late("scipy.special")
 
 MAX_ITERATIONS = 30
 TOLERANCE = 1e-4  # relative change of a and b
@@ -48,7 +55,7 @@ def fit_noise_power(scatter: FloatArray, gain: FloatArray, degrees: float) -> Fl
     if not scatter.any():
         return np.zeros_like(scatter)
     bands, weights = _overlapping_bands(len(scatter), max(FEWEST_LINES, round(DEGREES / degrees)))
-    limit = gammainccinv(degrees, OUTLIERS / len(scatter)) / degrees
+    limit = special.gammainccinv(degrees, OUTLIERS / len(scatter)) / degrees
     used = np.ones_like(scatter)
     power = np.empty_like(scatter)
     for _ in range(2):
