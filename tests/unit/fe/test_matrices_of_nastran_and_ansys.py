@@ -171,6 +171,14 @@ def test_damaged_tables_of_rows_are_refused_by_name(tmp_path, rows):
         read_model(model_toml(tmp_path, ("f.npz", "f.npz"), rows))
 
 
+def test_an_op2_of_results_is_not_called_damaged(tmp_path, nastran_files):
+    np.savez(tmp_path / "f.npz", K=STIFFNESS, M=MASS)
+    shutil.copy(nastran_files / "inboard.op2", tmp_path / "f.op2")
+    with pytest.raises(FileFormatError, match=r"holds the data blocks PVT0, .* written by NAS2CAM") as error:
+        read_model(model_toml(tmp_path, ("f.npz", "f.npz"), "f.op2"))
+    assert "damaged" not in str(error.value)
+
+
 @pytest.mark.slow
 def test_a_cut_full_file_is_refused(tmp_path):
     examples = pytest.importorskip("ansys.mapdl.reader.examples", reason="the extra 'ansys' is not installed")

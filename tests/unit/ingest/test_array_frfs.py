@@ -170,3 +170,21 @@ def test_frfs_that_are_each_followed_by_their_coherence(tmp_path):
     frfs = frf_ipz.read_frfs(tmp_path / "a.mat", quantity="receptance", output=["1:+z", "2:+z"], input="1:+z")
     np.testing.assert_array_equal(frfs.values, columns[:, ::2])
     np.testing.assert_array_equal(frfs.coherence, columns[:, 1::2].real)
+
+
+@pytest.mark.parametrize(("beside", "first"), [({"df": 1.0, "f_start": 1, "f_end": 199.5}, 1.0), ({"df": 1.0}, 0.0)])
+def test_two_columns_are_the_parts_of_frfs_with_a_step(tmp_path, beside, first):
+    frf = FRFS[:, 0, 0]
+    scipy.io.savemat(tmp_path / "a.mat", {"H00": np.column_stack([frf.real, frf.imag]), **beside})
+    for variables in ({}, {"frf": "H00"}):
+        frfs = read(tmp_path / "a.mat", output="1:+z", input="1:+z", variables=variables)
+        np.testing.assert_allclose(frfs.values[:, 0], frf, rtol=1e-12)
+        np.testing.assert_allclose(frfs.frequency_hz, LINES_HZ - 1.0 + first, rtol=1e-12)
+
+
+def test_a_step_that_does_not_lead_to_the_last_frequency_is_not_taken(tmp_path):
+    frf = FRFS[:, 0, 0]
+    columns = np.column_stack([frf.real, frf.imag])
+    scipy.io.savemat(tmp_path / "a.mat", {"H00": columns, "df": 1.0, "f_start": 1, "f_end": 300.0})
+    with pytest.raises(InputError, match="no complex array with a vector of as many frequencies"):
+        read(tmp_path / "a.mat", output="1:+z", input="1:+z")

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
+from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.matrices.dof_table import DofTable
 from frf_ipz.fe.matrices.stored import MOST_BYTES
 from frf_ipz.foreign_errors import errors_of_reader, import_reader
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 KIND, EXTRA = "a file of Nastran", "nastran"
 SETS = ("a", "l", "f", "n", "g")  # the usual ones of matrices first
 POINT_ROWS = len(DIRECTIONS)
+FIRST_OF_NAS2CAM = ("SUPERID", "SLIST")  # data blocks
+BLOCKS_SHOWN = 4
 RECTANGULAR, CYLINDRICAL, SPHERICAL = 1, 2, 3
 
 
@@ -57,6 +60,7 @@ def read_uset(path: Path) -> DofTable:
         if not is_binary:
             return _table_of_super_element(copy, path, reader)
         with reader.OP2(str(copy)) as file:
+            _require_rows(path, list(file.dbnames))
             usets = file.rdn2cop2()["uset"]
         tables = [_table(usets[number], n2p) for number in sorted(usets)]
         first = tables[0]
@@ -66,6 +70,14 @@ def read_uset(path: Path) -> DofTable:
             axes=first.axes,
             choices=tuple(choice for table in tables for choice in table.choices),
         )
+
+
+def _require_rows(path: Path, blocks: list[str]) -> None:
+    """Refuse an OP2 of results: only NAS2CAM writes one that begins with the super-elements of its USET."""
+    if blocks and blocks[0] not in FIRST_OF_NAS2CAM:
+        shown = ", ".join(blocks[:BLOCKS_SHOWN]) + (", ..." if len(blocks) > BLOCKS_SHOWN else "")
+        problem = f"holds the data blocks {shown} and does not name the rows of matrices; an OP2 that does is written"
+        raise FileFormatError(path, f"{problem} by NAS2CAM, with the matrices in the OP4 beside it")
 
 
 def _table_of_super_element(copy: Path, path: Path, reader: Any) -> DofTable:  # noqa: ANN401 - a module

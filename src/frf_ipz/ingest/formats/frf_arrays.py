@@ -39,6 +39,9 @@ COHERENCE = re.compile(r"(coh|gamma2?|cxy)\w*", re.IGNORECASE)
 OUTPUTS = re.compile(r"(output|response|out)_?(dofs?|names?|points?|channels?)", re.IGNORECASE)
 INPUTS = re.compile(r"(input|reference|excitation|in|ref)_?(dofs?|names?|points?|channels?)", re.IGNORECASE)
 FRF_NAME = re.compile(r"h(?![a-z])|frf|tf|accelerance|mobility|receptance|responsedata", re.IGNORECASE)
+STEP = re.compile(r"d_?f|delta_?f|(f|freq\w*)_?(step|res\w*)", re.IGNORECASE)
+START = re.compile(r"(f|freq\w*)_?(start|min|low|0)", re.IGNORECASE)
+END = re.compile(r"(f|freq\w*)_?(end|stop|max|high)", re.IGNORECASE)
 RESPONSE_DATA = "ResponseData"  # of frd and idfrd
 FEWEST_LINES = 2
 
@@ -199,7 +202,8 @@ def _named_block(arrays: FileArrays, variables: Mapping[str, str]) -> FrfBlock:
 
 def _complex_values(arrays: FileArrays, given: Mapping[str, NumericArray]) -> ComplexArray:
     if "frf" in given:
-        return np.asarray(given["frf"], np.complex128)
+        joined = _joined_columns(given["frf"])
+        return np.asarray(given["frf"], np.complex128) if joined is None else joined
     parts = set(given) & set(PARTS)
     magnitudes, phases = parts & {"magnitude", "magnitude_db"}, parts & {"phase_deg", "phase_rad"}
     shapes = {given[key].shape for key in parts}
@@ -347,7 +351,20 @@ def _complex_arrays(arrays: FileArrays) -> list[tuple[str, ComplexArray]]:
         other = None if match is None else arrays.find(match[1] + {"real": "imag", "re": "im"}[match[2].lower()])
         if match and other and array.shape == arrays.arrays[other].shape and array.size > 1:
             found.append((name, np.asarray(array + 1j * arrays.arrays[other], np.complex128)))
-    return found
+    return found or _columns_of_parts(arrays)
+
+
+def _columns_of_parts(arrays: FileArrays) -> list[tuple[str, ComplexArray]]:
+    named = {name: array for name, array in arrays.arrays.items() if FRF_NAME.match(last_part(name))}
+    joined = {name: _joined_columns(array) for name, array in named.items()}
+    return [(name, values) for name, values in joined.items() if values is not None]
+
+
+def _joined_columns(array: NumericArray) -> ComplexArray | None:
+    """Join two real columns, real and imaginary part; None where they are others, or frequencies and a value."""
+    if array.ndim != 2 or array.shape[1] != 2 or len(array) < FEWEST_LINES or np.iscomplexobj(array):
+        return None
+    return None if (np.diff(array[:, 0]) > 0).all() else np.asarray(array[:, 0] + 1j * array[:, 1], np.complex128)
 
 
 def _find_frequencies(
@@ -366,7 +383,9 @@ def _find_frequencies(
         for name, vector in vectors.items():
             if pattern.fullmatch(last_part(name)):
                 return name, vector * factor
-    return next(iter(vectors.items())) if len(vectors) == 1 else _lines_of_transform(arrays, shape)
+    if len(vectors) == 1:
+        return next(iter(vectors.items()))
+    return _lines_of_transform(arrays, shape) or _lines_by_step(arrays, shape)
 
 
 def _lines_of_transform(arrays: FileArrays, shape: tuple[int, ...]) -> tuple[str, FloatArray] | None:
@@ -379,6 +398,26 @@ def _lines_of_transform(arrays: FileArrays, shape: tuple[int, ...]) -> tuple[str
         is_rate = RATE.fullmatch(last_part(name)) or FREQUENCY.fullmatch(last_part(name))
         if is_rate and 1.0 < number < np.inf:
             return f"{name} ({number:g} samples a second)", np.linspace(0.0, 0.5 * number, n_lines)
+    return None
+
+
+def _lines_by_step(arrays: FileArrays, shape: tuple[int, ...]) -> tuple[str, FloatArray] | None:
+    """Make lines from a step, and a first and a last frequency where they are there, as in ``f_start:df:f_end``."""
+    step, start, end = (_number_called(arrays, key) for key in (STEP, START, END))
+    if step is None or not 0.0 < step[1] < np.inf:
+        return None
+    n_lines, first_hz = max(shape, default=0), 0.0 if start is None else start[1]
+    if end is not None and n_lines != 1 + int(np.floor((end[1] - first_hz) / step[1] * (1 + ROUNDED))):
+        return None
+    lines_hz = np.asarray(first_hz + step[1] * np.arange(n_lines), np.float64)
+    return f"{step[0]} ({step[1]:g} Hz from line to line, from {first_hz:g} Hz on)", lines_hz
+
+
+def _number_called(arrays: FileArrays, key: re.Pattern[str]) -> tuple[str, float] | None:
+    """Find a single number by its name."""
+    for name, array in arrays.arrays.items():
+        if array.size == 1 and key.fullmatch(last_part(name)):
+            return name, float(array.ravel()[0].real)
     return None
 
 
