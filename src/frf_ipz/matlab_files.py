@@ -12,15 +12,17 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
 
 from frf_ipz.errors import FileFormatError
+from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.input_files import read_bytes
 from frf_ipz.matlab_elements import COMPRESSED, HEADER_BYTES, TAG_BYTES, DamagedError, require_elements
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+KIND = "a MATLAB file of version 4 to 7.2"
+LOSSES = ("corrupt", "Unreadable", "Duplicate")  # words of SciPy's warnings where a variable is not what the file means
 MOST_BYTES = 1 << 28  # of one file, expanded: half of what looking at any folder may take
 ORDERS = {b"IM": "<", b"MI": ">"}  # how the header says in which order the bytes of a number stand
 
@@ -54,23 +56,11 @@ def read_matlab(path: Path, *, most_bytes: int = MOST_BYTES) -> dict[str, Any]:
         except DamagedError as error:
             raise FileFormatError(path, f"is damaged: {error}; write it again") from None
     stream: Any = BytesIO(data)
-    try:
-        values: dict[str, Any] = loadmat(stream)
-    except (
-        MatReadError,
-        NotImplementedError,
-        OSError,
-        TypeError,
-        ValueError,
-        KeyError,
-        IndexError,
-        zlib.error,
-    ) as error:
-        raise FileFormatError(
-            path, f"is no MATLAB file of version 4 to 7.2, or damaged ({type(error).__name__}: {error})"
-        ) from None
-    except (MemoryError, OverflowError, RecursionError):
-        raise FileFormatError(path, "says that it holds more than memory takes; is it damaged?") from None
+    with errors_of_reader(path, KIND, losses=LOSSES):
+        try:
+            values: dict[str, Any] = loadmat(stream)
+        except (MemoryError, OverflowError, RecursionError):
+            raise FileFormatError(path, "says that it holds more than memory takes; is it damaged?") from None
     return values
 
 

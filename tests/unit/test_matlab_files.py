@@ -168,3 +168,30 @@ def test_a_changed_byte_gives_values_or_the_error_of_the_project(tmp_path):
         except FileFormatError:
             refused += 1
     assert 0 < refused < 600
+
+
+def version_4(name, *, kind=0):
+    """Give one number under a name; the kind says how its bytes stand."""
+    text = name.encode("latin-1") + b"\0"
+    return struct.pack("<5i", kind, 1, 1, 0, len(text)) + text + struct.pack("<d", 2.5)
+
+
+def test_numbers_that_scipy_reads_as_others_are_refused(tmp_path):
+    path = tmp_path / "a.mat"
+    path.write_bytes(version_4("K"))
+    assert read_matlab(path)["K"] == 2.5
+    path.write_bytes(version_4("K", kind=2000))  # of a VAX
+    with pytest.raises(FileFormatError, match=r"a\.mat.*VAX"):
+        read_matlab(path)
+    path.write_bytes(header() + matrix(6, element(9, struct.pack("<d", 3))) + matrix(6, element(9, bytes(8))))
+    with pytest.raises(FileFormatError, match="Duplicate"):
+        read_matlab(path)
+
+
+def test_what_is_said_of_a_damaged_name_is_one_short_line(tmp_path):
+    path = tmp_path / "a.mat"
+    path.write_bytes(version_4("K\n" * 3000)[:-4])
+    with pytest.raises(FileFormatError, match="damaged") as caught:
+        read_matlab(path)
+    assert len(str(caught.value)) < 500 + len(str(path))
+    assert "\n" not in str(caught.value)
