@@ -241,6 +241,27 @@ def test_a_wrong_unit_is_named_where_a_point_mass_stays_as_it_is(changed):
     assert ("common factor" in cause.says) == ("youngs_modulus_Pa" in changed)
 
 
+def test_what_a_nearly_right_model_is_off_is_no_cause_beside_modes_that_it_lacks(fit):
+    """A suspension adds modes below the first; the update corrects a stiffness that is some percent off."""
+    beam = frf_ipz.make_beam(**BEAM)
+    computed = computed_modes(frf_ipz.solve_modes(beam, n_modes=24))
+    count = 18
+    products = computed.products(FRF, {}, {})[:count]
+    hung_hz = np.array([4.0, 6.3, 7.0])
+    measured = replace(
+        measured_modes(fit),
+        frequency_hz=np.concatenate([hung_hz, 1.028 * computed.frequency_hz[:count]]),
+        products=np.concatenate([products[:3], products]).astype(complex),
+        deviations=1e-6 * np.abs(np.concatenate([products[:3], products])),
+        band_hz=(1.0, float(1.1 * computed.frequency_hz[count - 1])),
+    )
+    files = {"test_file": "test.toml", "model_file": "model.toml"}
+    assert find_likely_cause(Situation(measured=measured, computed=computed, model=beam, **files)) is None
+    stiffer = replace(computed, frequency_hz=computed.frequency_hz / 1.2)
+    cause = find_likely_cause(Situation(measured=measured, computed=stiffer, model=beam, **files))
+    assert "youngs_modulus_Pa" in cause.line_or_key
+
+
 def test_the_time_in_ms_is_named(fit):
     cause = cause_of(fit, frequency_factor=1e-3)
     assert "time is in ms" in cause.says

@@ -62,6 +62,13 @@ def test_a_structure_of_an_idfrd_object(tmp_path, name):
     expect(read(tmp_path / name, output=None, input=None))
 
 
+def test_an_unknown_unit_of_frequencies_names_the_file(tmp_path):
+    system = {"ResponseData": np.moveaxis(FRFS, 0, 2), "Frequency": LINES_HZ[:, None], "FrequencyUnit": "rad/TimeU"}
+    scipy.io.savemat(tmp_path / "a.mat", {"sys": system})
+    with pytest.raises(InputError, match=r"a\.mat, 'sys\.FrequencyUnit': 'rad/TimeU' is no unit"):
+        read(tmp_path / "a.mat")
+
+
 def test_what_testlab_exports(tmp_path):
     names = [f"FRF beam:{output}:+Z/beam:{input_}:+Z" for output in (1, 2) for input_ in (1, 2)]
     block = {

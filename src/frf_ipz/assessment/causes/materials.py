@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from frf_ipz.assessment.causes.cause import Cause
-from frf_ipz.assessment.causes.modal_comparison import computed_modes
+from frf_ipz.assessment.causes.modal_comparison import FREQUENCY_SCALE, computed_modes
 from frf_ipz.errors import FrfIpzError
 from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.kinds.beam import BeamFile, BeamOptions, BeamSection, build_beam
@@ -207,7 +207,8 @@ def wrong_values(situation: Situation) -> Iterator[Cause]:
     for number in numbers:
         for ratio in ratios:
             factor = float(ratio) ** (2 / (number.stiffness_power - number.mass_power))
-            if not 1 / MOST < factor < MOST or abs(np.log(factor)) < NEAR:
+            is_scatter = abs(np.log(ratio)) < FREQUENCY_SCALE  # of a model that is nearly right
+            if not 1 / MOST < factor < MOST or is_scatter:
                 continue
             direction = "low" if factor > 1 else "high"
             times = max(factor, 1 / factor)

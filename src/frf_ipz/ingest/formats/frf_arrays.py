@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.dofs import AnyDof, Dof, parse_dof
-from frf_ipz.errors import FileFormatError, InputError, did_you_mean
+from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean
 from frf_ipz.ingest.formats.file_arrays import FileArrays, describe, last_part
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.frf_text import ANGULAR
@@ -274,7 +274,11 @@ def _response_data(arrays: FileArrays) -> list[FrfBlock]:
         if way == key or frequency is None:
             continue
         unit = "".join(arrays.texts.get(f"{way}FrequencyUnit", ("rad/s",))).replace("TimeUnit", "s")
-        frequency_hz = np.asarray(frequency, np.float64).ravel() * frequency_factor(unit)
+        try:
+            factor = frequency_factor(unit)
+        except QuantityError as error:
+            raise FileFormatError(arrays.path, str(error), where=f"'{way}FrequencyUnit'") from None
+        frequency_hz = np.asarray(frequency, np.float64).ravel() * factor
         shaped = _lines_first(arrays, key, np.atleast_3d(np.asarray(values)), len(frequency_hz), last=True)
         units = [arrays.texts.get(f"{way}{end}Unit", ()) for end in ("Output", "Input")]
         same = all(len(set(texts)) == 1 and texts[0].strip() for texts in units)
