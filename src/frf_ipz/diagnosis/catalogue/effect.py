@@ -81,7 +81,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Signature:
-    """An effect as one dynamic stiffness on one motion, for a fast search.
+    """An effect as one dynamic stiffness on one motion, or on each of several, for a fast search.
 
     Parameters
     ----------
@@ -95,6 +95,8 @@ class Signature:
         The parameter that multiplies the dynamic stiffness.
     amplitudes : (n,) array, optional
         What to try; chosen from the structure's own stiffness where it is left out.
+    further_motions : tuple of Motion
+        Other motions that the same dynamic stiffness acts on, each by itself: a mass acts in all directions.
 
     Examples
     --------
@@ -110,6 +112,12 @@ class Signature:
     values: FloatArray
     amplitude: int = 0
     amplitudes: FloatArray | None = None
+    further_motions: tuple[Motion, ...] = ()
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """All motions that it acts on."""
+        return (Motion.of(self.motion), *self.further_motions)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

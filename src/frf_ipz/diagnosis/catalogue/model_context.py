@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.diagnosis.model.layout import Layout, measure_extents
+from frf_ipz.diagnosis.model.layout import AXES, Layout, measure_extents
 from frf_ipz.diagnosis.model.motion import Motion
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.dofs import Dof
@@ -108,6 +108,12 @@ class ModelContext:
     def motion(self, dof: Dof) -> Motion:
         """Motion of one DOF, by index."""
         return Motion(rows=(self.model.full_index(dof),), weights=(1.0,))
+
+    def other_translations(self, dof: Dof) -> tuple[Motion, ...]:
+        """Motions of the node of a DOF along the other axes in which it is free to move."""
+        others = [Dof(dof.node, axis) for axis in AXES if axis != dof.direction]
+        indices, fixed = self.model.full_indices, self.model.fixed
+        return tuple(self.motion(other) for other in others if other in indices and not fixed[indices[other]])
 
     def spring_at(self, location: Location) -> Part:
         """Find the spring of the model that a location names."""

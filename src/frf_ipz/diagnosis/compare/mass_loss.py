@@ -55,13 +55,14 @@ class MassLoss(Effect):
         return lambda values: Change(mass=MatrixSum(((-values[0], unit),)))
 
     def signature(self, context: ModelContext, location: Location) -> Signature:
-        """-s^2 m against the direction of the test."""
+        """-s^2 m in all translational directions of the node."""
         (parameter,) = self.parameters(context, location)
         return Signature(
             motion=context.motion(location.dof),
             shapes=-(context.contour[None] ** 2),
             values=np.ones((1, 1)),
             amplitudes=np.geomspace(0.05, 1.0, 8) * parameter.high,
+            further_motions=context.other_translations(location.dof),
         )
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:

@@ -2,9 +2,10 @@
 
 Many effects are one dynamic stiffness D on one motion p. The FRFs then change by ``-R_sp D / (1 + R_pp D) R_ph``: for
 every line the misfit is a quadratic of one complex number, whose three coefficients do not depend on the effect. All
-such effects at all locations, for all values of their parameters, cost a few operations a line each. Sensors that sit
-elsewhere read other rows of the same modal motion: all of them at all nodes are one product. The others are evaluated
-value by value. Misfits count by their logarithm.
+such effects at all locations, for all values of their parameters, cost a few operations a line each. What acts on
+several motions alike, a mass in all directions, is as many such numbers, of the principal axes of R_pp. Sensors that
+sit elsewhere read other rows of the same modal motion: all of them at all nodes are one product. The others are
+evaluated value by value. Misfits count by their logarithm.
 """
 
 from __future__ import annotations
@@ -42,8 +43,9 @@ NUISANCE_ERROR = 0.1  # the same where the nuisance was fitted
 NEIGHBOURS_OF = 16  # best locations of each effect whose neighbours are scanned, where not all locations are listed
 
 
-Terms: TypeAlias = tuple[FloatArray, ComplexArray, FloatArray, ComplexArray]
-"""Of the misfit of each line with a dynamic stiffness on each motion: constant, linear, square; and R_pp."""
+Terms: TypeAlias = tuple[FloatArray, ComplexArray, ComplexArray, ComplexArray]
+"""Of the misfit of each line with a dynamic stiffness on the motions of each location: constant, (n_points,); linear,
+(n_locations, n_axes, n_points); square, (n_locations, n_axes, n_axes, n_points); and R_pp, as linear."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,6 +97,49 @@ def evaluate_receptances(
         at_attachments = np.matmul(shapes, base.attached_motion)
         at_motions = at_motions - np.einsum("kpa,kab,kpb->kp", at_attachments, base.attached_stiffness, at_attachments)
     return Receptances(across=np.moveaxis(across, 1, 2), at_motions=np.asarray(at_motions))
+
+
+def evaluate_on_axes(
+    base: Response, basis: Basis, layout: Layout, locations: Sequence[tuple[Motion, ...]]
+) -> Receptances:
+    """Evaluate FRFs of the motions of locations, along the principal axes of the receptance of each.
+
+    Parameters
+    ----------
+    base : Response
+        Of the fit to build on.
+    basis : Basis
+        Its coordinates.
+    layout : Layout
+        Sensors and excited points.
+    locations : sequence of tuple of Motion
+        As many motions for each, on which the same dynamic stiffness acts.
+
+    Returns
+    -------
+    Receptances
+        With a last axis for the axes, (n_points, n_frfs, n_locations, n_axes) and (n_points, n_locations, n_axes): a
+        dynamic stiffness acts along each of them as if it were alone.
+    """
+    motions, n_axes = [motion for of_location in locations for motion in of_location], len(locations[0])
+    missing = compute_missing_flexibility(basis, motions)
+    if n_axes == 1:
+        alone = evaluate_receptances(base, basis, layout, motions, missing)
+        return Receptances(across=alone.across[..., None], at_motions=alone.at_motions[..., None])
+    shapes = (basis.project_motions(motions) @ base.modes.vectors).reshape(len(locations), n_axes, -1)
+    s, modes = base.s[:, None], base.modes
+    inverse = 1 / (s**2 + s * 2 * modes.ratio * np.sqrt(np.abs(modes.squares)) + modes.squares)
+    between = (shapes[:, :, None] * shapes[:, None]).reshape(-1, shapes.shape[2])
+    at_motions = (inverse @ between.T).reshape(len(s), len(locations), n_axes, n_axes)
+    at_motions += missing.reshape(-1, n_axes, 1) * np.eye(n_axes)
+    if base.attached_motion.shape[2]:
+        at_attachments = shapes @ base.attached_motion[:, None]
+        at_motions -= at_attachments @ base.attached_stiffness[:, None] @ at_attachments.swapaxes(2, 3)
+    along_axes, axes = np.linalg.eig(at_motions)
+    from_outputs = axes.swapaxes(2, 3) @ (shapes @ base.output_motion[:, None])
+    from_inputs = np.linalg.solve(axes, shapes @ base.input_motion[:, None])
+    across = from_outputs[..., layout.output_index] * from_inputs[..., layout.input_index]
+    return Receptances(across=np.moveaxis(across * base.chain[:, None, None], 3, 1), at_motions=np.asarray(along_axes))
 
 
 def compute_missing_flexibility(basis: Basis, motions: Sequence[Motion]) -> FloatArray:
@@ -236,11 +281,12 @@ def scan_signatures(
     constant = np.sum(weights * np.abs(misfit) ** 2, 1)
     starts = []
     for group in _group_by_motion(signatures):
-        motions = [Motion.of(signatures[members[0]].motion) for members in group]
-        receptances = evaluate_receptances(base, basis, layout, motions, compute_missing_flexibility(basis, motions))
-        linear = np.einsum("kf,kfp->pk", weights * misfit.conj(), receptances.across)
-        square = np.einsum("kf,kfp->pk", weights, np.abs(receptances.across) ** 2)
-        at_motions = np.ascontiguousarray(receptances.at_motions.T)
+        receptances = evaluate_on_axes(base, basis, layout, [signatures[members[0]].motions for members in group])
+        across = np.ascontiguousarray(receptances.across.transpose(0, 2, 3, 1))
+        weighted = weights[:, None, None] * across.conj()
+        linear = np.moveaxis(across @ (weights * misfit.conj())[:, None, :, None], 0, 3)[:, :, 0]
+        square = np.moveaxis(across @ weighted.swapaxes(2, 3), 0, 3)
+        at_motions = np.moveaxis(receptances.at_motions, 0, 2)
         columns = {member: column for column, members in enumerate(group) for member in members}
         for members in _group_by_shape(signatures, columns):
             used = [columns[member] for member in members]
@@ -254,13 +300,15 @@ def scan_signatures(
 
 
 def _group_by_motion(signatures: Sequence[Signature]) -> Iterator[list[list[int]]]:
-    """Signatures on the same motion share their receptances; motions come in groups that fit into memory."""
-    members: dict[Motion, list[int]] = {}
+    """Signatures on the same motions share their receptances; motions come in groups that fit into memory."""
+    members: dict[int, dict[tuple[Motion, ...], list[int]]] = {}
     for index, signature in enumerate(signatures):
-        members.setdefault(Motion.of(signature.motion), []).append(index)
-    groups = list(members.values())
-    for start in range(0, len(groups), MOTIONS_AT_ONCE):
-        yield groups[start : start + MOTIONS_AT_ONCE]
+        motions = signature.motions
+        members.setdefault(len(motions), {}).setdefault(motions, []).append(index)
+    for count, of_motions in members.items():
+        groups, at_once = list(of_motions.values()), MOTIONS_AT_ONCE // count
+        for start in range(0, len(groups), at_once):
+            yield groups[start : start + at_once]
 
 
 def _group_by_shape(signatures: Sequence[Signature], members: Iterable[int]) -> Iterator[list[int]]:
@@ -282,7 +330,8 @@ def _best_amplitudes(signatures: Sequence[Signature], terms: Terms) -> tuple[lis
     at_motion, number = terms[3], np.arange(len(signatures))
     shapes = np.stack([signature.shapes for signature in signatures])
     if signatures[0].amplitudes is None:
-        scale = np.median(np.abs(at_motion), axis=1)[:, None] * np.median(np.abs(shapes), axis=2)
+        compliance = np.median(np.abs(at_motion), axis=2).max(axis=1)
+        scale = compliance[:, None] * np.median(np.abs(shapes), axis=2)
         amplitudes = AMPLITUDES / scale[:, :, None]
     else:
         stated = np.array([signature.amplitudes for signature in signatures], float)
@@ -304,10 +353,16 @@ def _best_amplitudes(signatures: Sequence[Signature], terms: Terms) -> tuple[lis
 
 def _costs(shapes: ComplexArray, amplitudes: FloatArray, terms: Terms) -> FloatArray:
     """Robust misfits of shapes times amplitudes, (n_motions, n_shapes, n_amplitudes)."""
-    constant, linear, square, at_motion = terms
+    constant, linear, square, at_motion = (term[:, None, None] if term.ndim > 1 else term for term in terms)
     stiffness = amplitudes[..., None] * shapes[:, :, None]
-    effective = stiffness / (1 + at_motion[:, None, None] * stiffness)
-    squares = constant + 2 * (effective * linear[:, None, None]).real + np.abs(effective) ** 2 * square[:, None, None]
+    n_axes, squares = at_motion.shape[3], constant
+    effective = [stiffness / (1 + at_motion[..., axis, :] * stiffness) for axis in range(n_axes)]
+    for axis, along in enumerate(effective):
+        squares = (
+            squares + 2 * (along * linear[..., axis, :]).real + np.abs(along) ** 2 * square[..., axis, axis, :].real
+        )
+        for other in range(axis):
+            squares += 2 * (along * effective[other].conj() * square[..., axis, other, :]).real
     return np.asarray(np.sum(np.log1p(np.maximum(squares, 0.0)), axis=3))
 
 

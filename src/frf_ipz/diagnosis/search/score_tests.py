@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
-from frf_ipz.diagnosis.model.motion import Motion
 from frf_ipz.diagnosis.model.response import nuisance_jacobian
 from frf_ipz.diagnosis.search.global_scan import (
     MOTIONS_AT_ONCE,
@@ -220,10 +219,12 @@ def _score_signatures(test: ScoreTest, signed: list[tuple[Component, Signature]]
     for first in range(0, len(signed), MOTIONS_AT_ONCE):
         test.problem.deadline.check()
         group = signed[first : first + MOTIONS_AT_ONCE]
-        motions = [Motion.of(signature.motion) for _, signature in group]
+        motions = [motion for _, signature in group for motion in signature.motions]
+        firsts = np.cumsum([0, *(len(signature.motions) for _, signature in group[:-1])])
         hypothesis = test.base.hypothesis
         layout = hypothesis.context.layout
-        across = evaluate_receptances(test.response, hypothesis.basis, layout, motions, np.zeros(len(group))).across
+        each = evaluate_receptances(test.response, hypothesis.basis, layout, motions, np.zeros(len(motions))).across
+        across = np.add.reduceat(each, firsts, axis=2)
         for column, (_, signature) in enumerate(group):
             for shape, curve in enumerate(signature.shapes):
                 batch.append((first + column, shape, -across[:, :, column] * curve[:, None]))

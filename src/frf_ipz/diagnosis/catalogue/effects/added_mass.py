@@ -49,13 +49,14 @@ class AddedMass(Effect):
         return lambda values: Change(mass=MatrixSum(((values[0], unit),)))
 
     def signature(self, context: ModelContext, location: Location) -> Signature:
-        """s^2 m against the direction of the test."""
+        """s^2 m in all translational directions of the node."""
         amplitudes = np.geomspace(3e-4, 1.0, 14) * context.mass_kg
         return Signature(
             motion=context.motion(location.dof),
             shapes=context.contour[None] ** 2,
             values=np.ones((1, 1)),
             amplitudes=amplitudes,
+            further_motions=context.other_translations(location.dof),
         )
 
     def neighbours(self, context: ModelContext, location: Location) -> Sequence[Location]:
