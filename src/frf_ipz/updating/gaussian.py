@@ -156,7 +156,7 @@ class Linearised:
         (n, ...) array
             The same.
         """
-        return _rotated(self.axes, self.places, self.slack, rows)
+        return _rotated(self.axes, self.places, self.slack, rows.reshape(len(rows), -1)).reshape(rows.shape)
 
     def square(self, error: FloatArray, factor: float) -> float:
         """Weigh an error by the inverse of the noise.
@@ -360,9 +360,9 @@ def linearise(
         places.append(part)
     turned = tuple(axes), tuple(places), units
     level = np.concatenate(levels) if levels else np.zeros(0)
-    pieces = [_rotated(*turned, noise.common), *(_rotated(*turned, part) for part in parts)]
+    pieces = [noise.common, *parts]
     ends = tuple(np.cumsum([piece.shape[1] for piece in pieces]).tolist())
-    joined = np.hstack([*pieces, _rotated(*turned, data)[:, None]])
+    joined = _rotated(*turned, *pieces, data[:, None])
     del pieces  # large
     bases: tuple[FloatArray | None, ...] = (None,) * (len(ends) - 1)
     sums: list[tuple[FloatArray, FloatArray]] = []
@@ -463,12 +463,17 @@ def _told(information: FloatArray) -> FloatArray | None:
 
 
 def _rotated(
-    axes: tuple[FloatArray, ...], places: tuple[IntArray, ...], slack: FloatArray, rows: FloatArray
+    axes: tuple[FloatArray, ...], places: tuple[IntArray, ...], slack: FloatArray, *pieces: FloatArray
 ) -> FloatArray:
-    result = np.empty(rows.shape)
+    """Turn data whose columns come in pieces, and join them: written where they stay, as they are large."""
+    ends = [0, *np.cumsum([piece.shape[1] for piece in pieces]).tolist()]
+    result = np.empty((len(slack), ends[-1]))
     first = 0
     for place, vectors in zip(places, axes, strict=True):
-        result[first : first + len(place)] = (vectors.T / slack[place]) @ rows[place]
+        turn, target = vectors.T / slack[place], result[first : first + len(place)]
+        rows = slice(place[0], place[-1] + 1) if np.all(np.diff(place) == 1) else place  # a slice copies nothing
+        for piece, (start, end) in zip(pieces, pairwise(ends), strict=True):
+            np.matmul(turn, piece[rows], out=target[:, start:end])
         first += len(place)
     return result
 

@@ -10,6 +10,7 @@ positive semi-definite, rigid-body modes stay. The ensemble is drawn from the po
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -72,12 +73,11 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     for _ in range(ROUNDS):
         if again is None:
             break
-        model = update_of.model()
-        paired = again.with_model(problem, model, pairs or again.pairs, update_of.values(model))
+        paired = again.with_model(problem, update_of.model, pairs or again.pairs, update_of.values)
         if paired is None:
             break
         further = _solve(paired[1], frame, options, progress, start=update_of)
-        if not again.deviation_db(further.model()) < again.deviation_db(model):
+        if not again.deviation_db(further.model) < again.deviation_db(update_of.model):
             break
         pairs, update_of = paired[0], further
     progress(0.8, "ensemble")
@@ -88,7 +88,7 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     return replace(updated, before=before, pairs=again.named_before(pairs, problem.model, before))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class _Update:
     """An update of both phases: its targets, what is left open, what was done, and which targets were excluded."""
 
@@ -97,14 +97,16 @@ class _Update:
     history: tuple[tuple[str, PhaseResult], ...]
     excluded: IntArray
 
+    @cached_property
     def model(self) -> ReducedModel:
         nominal = self.problem.model
         mass, damping, stiffness = free_matrices(nominal, *self.posterior.model())
         return replace(nominal, mass=mass, damping=damping, stiffness=stiffness)
 
-    def values(self, model: ReducedModel) -> ComplexArray:
+    @cached_property
+    def values(self) -> ComplexArray:
         tracked = self.posterior.damping_result.tracked.values(len(self.problem.values))
-        return self.problem.nearest_roots(model, tracked)
+        return self.problem.nearest_roots(self.model, tracked)
 
 
 def _solve(
@@ -239,19 +241,16 @@ def _modal_rows(problem: UpdateProblem, frame: ModalFrame) -> dict[int, tuple[Fl
 
 def _updated(update_of: _Update, options: UpdateOptions) -> UpdatedModel:
     problem, posterior = update_of.problem, update_of.posterior
-    mass, damping, stiffness = posterior.model()
-    model = replace(problem.model, mass=mass, damping=damping, stiffness=stiffness)
     converged = posterior.stiffness_result.converged and posterior.damping_result.converged
     ensemble, draws = draw_ensemble(posterior, np.random.default_rng(options.seed), options.ensemble)
-    tracked = posterior.damping_result.tracked.values(len(problem.values))
     return UpdatedModel(
-        model=model,
+        model=update_of.model,
         nominal=problem.model,
         method="minimal-change",
         status=UpdateStatus.CONVERGED if converged else UpdateStatus.MAX_ITERATIONS,
         history=pd.DataFrame([{"phase": name, **row} for name, result in update_of.history for row in result.rows]),
         before=problem.computed,
-        after=problem.nearest_roots(model, tracked),
+        after=update_of.values,
         ensemble=ensemble,
         unmet=unmet_targets(posterior.stiffness_result, problem.names, update_of.excluded),
         parts=_parts(posterior.stiffness.basis, posterior.stiffness_result.theta, draws),
