@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import tomlkit
 
-from frf_ipz.errors import FileFormatError, did_you_mean
+from frf_ipz.errors import FileFormatError, InputError, did_you_mean
 from frf_ipz.fleet.machine_list import COLUMNS, read_machine_list
 from frf_ipz.input_files import read_text, require_regular_file
 from frf_ipz.option_types import Day
@@ -20,7 +21,7 @@ from frf_ipz.pipeline.pipeline_folder import find_pipeline
 from frf_ipz.toml_files import STRICT, parse_toml, read_toml, to_options
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
 STAGES = tuple(item.name for item in fields(StageOptions))
 PARTICULARS = tuple(name for name in COLUMNS if name not in {"id", "test"})
@@ -240,13 +241,16 @@ def read_fleet(path: Path) -> Fleet:
     file = read_toml(path, FleetFile, required="fleet")
     path = path.resolve()
     section = file.fleet
-    pipeline = find_pipeline(path.parent / section.pipeline)
+    with _named_by(path, "fleet.pipeline"):
+        pipeline = find_pipeline(path.parent / section.pipeline)
+        require_regular_file(pipeline)
     settings = parse_toml(read_text(pipeline), pipeline)
     # what is wrong for all is said of the file in which it stands
     to_options({**settings, "pipeline": {"test": "test.toml"}}, PipelineFile, pipeline)
     model = None if section.model is None else (path.parent / section.model).resolve()
     if model is not None:
-        require_regular_file(model)
+        with _named_by(path, "fleet.model"):
+            require_regular_file(model)
     fleet = Fleet(
         path=path,
         name=section.name or path.stem,
@@ -260,6 +264,15 @@ def read_fleet(path: Path) -> Fleet:
     for machine in fleet.machines:
         fleet.pipeline_of(machine)
     return fleet
+
+
+@contextmanager
+def _named_by(path: Path, key: str) -> Iterator[None]:
+    """Say of a file that cannot be used where it is named."""
+    try:
+        yield
+    except InputError as error:
+        raise FileFormatError(path, str(error), where=f"key '{key}'") from None
 
 
 def _machines(path: Path, file: FleetFile) -> tuple[Machine, ...]:

@@ -94,7 +94,9 @@ WRONG = {
     "the model's name": (HEAD + '[[machine]]\nid = "model"\ntest = "t.toml"\n', "the id 'model' stands for"),
     "no section": ('[machine]\nid = "a"\n', "has no section [fleet]"),
     "no model": ('[fleet]\nmodel = "modell.toml"\npipeline = "pipeline.toml"\n', "modell.toml: there is no such file"),
+    "no model, where": ('[fleet]\nmodel = "modell.toml"\npipeline = "pipeline.toml"\n', "key 'fleet.model': "),
     "no pipeline": ('[fleet]\npipeline = "pipe.toml"\n', "pipe.toml: there is no such file"),
+    "no pipeline, where": ('[fleet]\npipeline = "pipe.toml"\n', "fleet.toml, key 'fleet.pipeline': "),
 }
 
 
