@@ -53,7 +53,7 @@ def write_inputs(folder, *, diagnosed=True):
     for name in ("matrices", "uff"):
         (folder / name).mkdir(parents=True)
         export(folder / name, beam(left="clamped", elements=4))
-        text = MATRICES_PIPELINE if diagnosed else MATRICES_PIPELINE + '[diagnose]\nrun = "never"\n'
+        text = MATRICES_PIPELINE + "[diagnose]\n" + ("seconds = 2.0\n" if diagnosed else 'run = "never"\n')
         (folder / name / "pipeline.toml").write_text(text, encoding="utf-8")
     values = np.exp(2j * np.pi * LINES_HZ / 400) / (1 - (LINES_HZ / 80) ** 2 + 0.02j * LINES_HZ / 80)
     rows = "".join(
