@@ -12,7 +12,9 @@ from frf_ipz.cli import main as command
 from frf_ipz.errors import InputError
 from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.model_file import read_model
+from frf_ipz.ingest import recording_files
 from frf_ipz.ingest.campaign_file import read_test
+from frf_ipz.ingest.formats.registry import open_recording
 from frf_ipz.pipeline.check.setup import describe_setup
 from frf_ipz.pipeline.config import read_pipeline
 from frf_ipz.pipeline.init.starting_files import write_starting_files
@@ -46,6 +48,18 @@ def test_init_leaves_what_is_there(campaign):
     before = (campaign / "test.toml").read_text()
     assert not any(write_starting_files(campaign).written.values())
     assert (campaign / "test.toml").read_text() == before
+
+
+def test_check_reads_each_recording_once(campaign, monkeypatch):
+    opened = []
+
+    def counting(path, *arguments):
+        opened.append(path.name)
+        return open_recording(path, *arguments)
+
+    monkeypatch.setattr(recording_files, "open_recording", counting)
+    describe_setup(read_inputs(campaign))
+    assert sorted(opened) == ["blow_1.csv", "blow_2.csv", "blow_3.csv"]
 
 
 def test_init_groups_blows_by_the_name_of_their_files(campaign):

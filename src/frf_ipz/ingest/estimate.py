@@ -16,13 +16,16 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.estimation.modes import hand_on_modes
     from frf_ipz.ingest.estimation.random import estimate_random
     from frf_ipz.ingest.frf_estimate import FrfEstimate
+    from frf_ipz.ingest.recording_files import RecordingFiles
 else:
     estimate_frf_files = import_late("frf_ipz.ingest.estimation.frf_files", "estimate_frf_files")
     estimate_hammer = import_late("frf_ipz.ingest.estimation.hammer", "estimate_hammer")
     estimate_random = import_late("frf_ipz.ingest.estimation.random", "estimate_random")
     hand_on_modes = import_late("frf_ipz.ingest.estimation.modes", "hand_on_modes")
+    RecordingFiles = import_late("frf_ipz.ingest.recording_files", "RecordingFiles")
 
-KINDS = {"hammer": estimate_hammer, "random": estimate_random, "frf": estimate_frf_files, "modes": hand_on_modes}
+FROM_RECORDINGS = {"hammer": estimate_hammer, "random": estimate_random}
+FROM_RESULTS = {"frf": estimate_frf_files, "modes": hand_on_modes}
 
 
 def estimate_frfs(
@@ -70,6 +73,35 @@ def estimate_frfs(
     """
     require_type("test", test, VibrationTest)
     require_type("options", options, IngestOptions, optional=True)
-    result = KINDS[test.kind](test, options or IngestOptions(), progress)
+    return estimate_from(RecordingFiles(test=test), options or IngestOptions(), progress)
+
+
+def estimate_from(files: RecordingFiles, options: IngestOptions, progress: Progress = silent) -> FrfEstimate:
+    """Estimate the FRFs of a test whose recordings may have been read before.
+
+    Parameters
+    ----------
+    files : RecordingFiles
+        The recordings of the test; none for a test of FRFs or of modes.
+    options : IngestOptions
+        The user's choice.
+    progress : Progress
+        Called with the share of the work that is done.
+
+    Returns
+    -------
+    FrfEstimate
+        As `estimate_frfs` gives it.
+
+    Raises
+    ------
+    InputError
+        If a recording cannot be used.
+    """
+    kind = files.test.kind
+    if kind in FROM_RESULTS:
+        result = FROM_RESULTS[kind](files.test, options, progress)
+    else:
+        result = FROM_RECORDINGS[kind](files, options, progress)
     progress(1.0, "FRFs estimated")
     return result

@@ -19,7 +19,6 @@ from frf_ipz.ingest.estimation.spectra import SpectrumSums, empty_sums, estimate
 from frf_ipz.ingest.estimation.traces import add_traces
 from frf_ipz.ingest.estimation.variance import frf_variance
 from frf_ipz.ingest.frf_estimate import FrfEstimate, Trace
-from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.records import read_records, survey_records
 from frf_ipz.ingest.signals.windows import correlated_lines
 
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.ingest.campaign import TestSetup, VibrationTest
     from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.recording_files import RecordingFiles
     from frf_ipz.ingest.records import Record
     from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
     from frf_ipz.progress import Progress
@@ -80,7 +80,7 @@ class _LabelEstimate:
 
 
 def average_recordings(
-    test: VibrationTest,
+    files: RecordingFiles,
     options: IngestOptions,
     progress: Progress,
     add: Callable[[SetupAverage, RecordInfo, Record, Survey], float],
@@ -89,8 +89,8 @@ def average_recordings(
 
     Parameters
     ----------
-    test : VibrationTest
-        The test.
+    files : RecordingFiles
+        The recordings of the test.
     options : IngestOptions
         The user's choice.
     progress : Progress
@@ -108,7 +108,7 @@ def average_recordings(
     InputError
         If a recording cannot be used.
     """
-    files = RecordingFiles(test=test)
+    test = files.test
     survey = survey_records(files, options, lambda fraction, text: progress(SURVEY_SHARE * fraction, text))
     n_lines, n_outputs = survey.n_samples // 2 + 1, len(test.output_channels)
     averages = {setup: SetupAverage(empty_sums(n_lines, n_outputs), np.zeros(n_outputs)) for setup in test.setups}

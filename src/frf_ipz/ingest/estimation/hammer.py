@@ -13,23 +13,23 @@ from frf_ipz.ingest.signals.windows import exponential_window, force_window
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.estimation.averaging import SetupAverage
     from frf_ipz.ingest.estimation.impact_noise import ImpactNoise
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.recording_files import RecordingFiles
     from frf_ipz.ingest.records import Record
     from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
     from frf_ipz.progress import Progress
 
 
-def estimate_hammer(test: VibrationTest, options: IngestOptions, progress: Progress) -> FrfEstimate:
+def estimate_hammer(files: RecordingFiles, options: IngestOptions, progress: Progress) -> FrfEstimate:
     """Estimate the FRFs of a hammer test.
 
     Parameters
     ----------
-    test : VibrationTest
-        The test.
+    files : RecordingFiles
+        The recordings of the test.
     options : IngestOptions
         The user's choice.
     progress : Progress
@@ -45,7 +45,7 @@ def estimate_hammer(test: VibrationTest, options: IngestOptions, progress: Progr
     InputError
         If a recording cannot be used.
     """
-    return average_recordings(test, options, progress, _add_impact)
+    return average_recordings(files, options, progress, _add_impact)
 
 
 def _add_impact(average: SetupAverage, info: RecordInfo, record: Record, survey: Survey) -> float:

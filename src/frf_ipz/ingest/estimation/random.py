@@ -15,22 +15,22 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from frf_ipz.arrays import FloatArray
-    from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.estimation.averaging import SetupAverage
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.recording_files import RecordingFiles
     from frf_ipz.ingest.records import Record
     from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
     from frf_ipz.progress import Progress
 
 
-def estimate_random(test: VibrationTest, options: IngestOptions, progress: Progress) -> FrfEstimate:
+def estimate_random(files: RecordingFiles, options: IngestOptions, progress: Progress) -> FrfEstimate:
     """Estimate the FRFs of a test with a shaker.
 
     Parameters
     ----------
-    test : VibrationTest
-        The test.
+    files : RecordingFiles
+        The recordings of the test.
     options : IngestOptions
         The user's choice.
     progress : Progress
@@ -46,9 +46,9 @@ def estimate_random(test: VibrationTest, options: IngestOptions, progress: Progr
     InputError
         If a recording cannot be used.
     """
-    if len(test.input_channels) > 1:
-        return estimate_random_several(test, options, progress)
-    return average_recordings(test, options, progress, _add_record)
+    if len(files.test.input_channels) > 1:
+        return estimate_random_several(files, options, progress)
+    return average_recordings(files, options, progress, _add_record)
 
 
 def _add_record(average: SetupAverage, info: RecordInfo, record: Record, survey: Survey) -> float:

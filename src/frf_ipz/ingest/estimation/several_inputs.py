@@ -131,13 +131,13 @@ def estimate_several_inputs(forces: ComplexArray, responses: ComplexArray, indep
     )
 
 
-def estimate_random_several(test: VibrationTest, options: IngestOptions, progress: Progress) -> FrfEstimate:
+def estimate_random_several(files: RecordingFiles, options: IngestOptions, progress: Progress) -> FrfEstimate:
     """Estimate the FRFs of a test whose records have several forces at once.
 
     Parameters
     ----------
-    test : VibrationTest
-        Of kind ``random``, with several input channels.
+    files : RecordingFiles
+        Of a test of kind ``random``, with several input channels.
     options : IngestOptions
         `segment_s` chooses the length of the segments.
     progress : Progress
@@ -153,9 +153,9 @@ def estimate_random_several(test: VibrationTest, options: IngestOptions, progres
     InputError
         If a record cannot be used, there are too few segments, or the forces cannot be told apart.
     """
+    test = files.test
     if options.estimator != "H1":
         raise InputError(f"{test.path}: [ingest] estimator = '{options.estimator}' knows one force; several need 'H1'")
-    files = RecordingFiles(test=test)
     names = [channel.column for channel in test.input_channels]
     frfs: dict[FrfLabel, tuple[np.ndarray, ...]] = {}
     tables, notes = [], []

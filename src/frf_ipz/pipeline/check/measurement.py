@@ -10,7 +10,7 @@ import numpy as np
 
 from frf_ipz.errors import InputError
 from frf_ipz.identification.fit import fit_modes
-from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.estimate import estimate_from
 from frf_ipz.ingest.formats.frf_conventions import read_frf_source
 from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.survey.selection import record_name
@@ -45,13 +45,13 @@ HAMMER_HEADER = (
 SHAKER_HEADER = ("excited", "used", "peak force, N", "length, s", "remarks")
 
 
-def open_recordings(test: VibrationTest) -> tuple[list[str], bool]:
+def open_recordings(files: RecordingFiles) -> tuple[list[str], bool]:
     """Read what the run would read; large recordings to the first block.
 
     Parameters
     ----------
-    test : VibrationTest
-        The test.
+    files : RecordingFiles
+        The recordings of the test.
 
     Returns
     -------
@@ -65,11 +65,11 @@ def open_recordings(test: VibrationTest) -> tuple[list[str], bool]:
     InputError
         If a recording or a file of FRFs cannot be read as the test says.
     """
+    test = files.test
     for source in test.frf_sources:
         read_frf_source(source)
     recordings = [(setup, path) for setup in test.setups for path in setup.files if path not in test.signals]
     is_large = sum(path.stat().st_size for _, path in recordings) > WHOLE_BYTES
-    files = RecordingFiles(test=test)
     lengths: Counter[str] = Counter()
     faults = []
     for setup, path in recordings:
@@ -84,13 +84,13 @@ def open_recordings(test: VibrationTest) -> tuple[list[str], bool]:
     return [f"  read      {count} x {what}" for what, count in lengths.items()], not is_large
 
 
-def look_at_measurement(test: VibrationTest, options: StageOptions) -> tuple[Look, FrfEstimate]:
+def look_at_measurement(files: RecordingFiles, options: StageOptions) -> tuple[Look, FrfEstimate]:
     """Estimate FRFs, and say what the recordings behind them are like.
 
     Parameters
     ----------
-    test : VibrationTest
-        The test; its files can be read.
+    files : RecordingFiles
+        The recordings of the test; they can be read.
     options : StageOptions
         The user's choice.
 
@@ -106,7 +106,7 @@ def look_at_measurement(test: VibrationTest, options: StageOptions) -> tuple[Loo
     InputError
         If the recordings cannot be used.
     """
-    estimate = estimate_frfs(test, options=options.ingest)
+    test, estimate = files.test, estimate_from(files, options.ingest)
     notes = [f"  note      {text}" for text in estimate.warnings]
     if estimate.modes is not None:
         return _look_at_modes(estimate.modes, options), estimate

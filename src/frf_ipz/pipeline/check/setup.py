@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.pipeline.check.comparison import compare_with_model
 from frf_ipz.pipeline.check.look import Look
 from frf_ipz.pipeline.check.measurement import look_at_measurement, open_recordings
@@ -49,10 +50,11 @@ def describe_setup(inputs: PipelineInputs) -> str:
         lines += [*draw(inputs.fe_model.geometry, test.output_dofs, test.input_dofs, inputs.points), ""]
         lines += look_at_model(inputs.fe_model).lines
     lines.append(f"test        {test.name} ({test.kind}), {counted(len(test.files), 'file')}")
-    read_lines, is_whole = open_recordings(test)
+    files = RecordingFiles(test=test)
+    read_lines, is_whole = open_recordings(files)
     measurement = comparison = Look()
     if is_whole:
-        measurement, estimate = look_at_measurement(test, inputs.options)
+        measurement, estimate = look_at_measurement(files, inputs.options)
         comparison = compare_with_model(inputs, estimate)
     lines += [
         *read_lines,
