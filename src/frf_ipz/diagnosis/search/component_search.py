@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,10 +16,12 @@ from frf_ipz.diagnosis.search.neighbourhood_search import (
     MAX_BEHIND,
     N_EFFECTS,
     Fits,
+    evaluate_without_fit,
     find_cost_limit,
     refine_surroundings,
     search_neighbourhoods,
 )
+from frf_ipz.diagnosis.search.rivals import is_hopeless
 from frf_ipz.diagnosis.search.robust_refinement import (
     COST_RATIO,
     GAIN,
@@ -29,6 +32,10 @@ from frf_ipz.diagnosis.search.robust_refinement import (
     select_apart,
 )
 from frf_ipz.diagnosis.search.score_tests import run_score_test
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.diagnosis.evidence.hypothesis import Component
 
 N_SCORED = 14  # hypotheses that are fitted after the score test
 MIN_PROMISE = 5.0  # log-likelihood that a linear step promises: with less, a hypothesis is not fitted
@@ -261,7 +268,15 @@ def _fit_starts(problem: InferenceProblem, base: Fit, refined: Sequence[Start], 
     """Fit with inflated errors first, and then exactly what is not far behind."""
     known = base.hypothesis.components
     halfway = refine_halfway(problem, [(known, start) for start in refined[:N_ROUGH]])
-    rough_fits = [problem.fit_roughly((*known, start.component), start.values) for known, start in halfway]
+    candidates = [((*known, start.component), start.values) for known, start in halfway]
+    rough_fits = [problem.fit_roughly(*candidates[0])]
+    if rough_fits[0].explains_nearly_all:
+        best = problem.fit_exactly(rough_fits[0])
+        keep_better(fits, best)
+        if best.explains_nearly_all:
+            _fit_rivals(problem, best, candidates[1:], fits)
+            return
+    rough_fits += [problem.fit_roughly(*candidate) for candidate in candidates[1:]]
     if all(fit.is_far_off for fit in rough_fits):
         for start in select_apart(refined[:N_ROUGH], 1):
             around = refine_surroundings(problem, (*known, start.component), start.values)[:N_ROUGH_AROUND]
@@ -272,6 +287,18 @@ def _fit_starts(problem: InferenceProblem, base: Fit, refined: Sequence[Start], 
             keep_better(fits, problem.fit_exactly(fit, cost_limit=find_cost_limit(fits.values())))
     if not rough_fits[0].is_far_off:
         _fit_other_effects(problem, rough_fits, fits)
+
+
+def _fit_rivals(
+    problem: InferenceProblem, best: Fit, candidates: Sequence[tuple[tuple[Component, ...], FloatArray]], fits: Fits
+) -> None:
+    """Fit what may explain as much as one that explains nearly all; of each other effect say how far behind it is."""
+    for components, values in candidates:
+        hypothesis = problem.make_hypothesis(components)
+        if not is_hopeless(problem, best, hypothesis, (values,)):
+            keep_better(fits, problem.fit(components, values, cost_limit=find_cost_limit(fits.values())))
+        elif all(fit.hypothesis.components[-1].effect.name != components[-1].effect.name for fit in fits.values()):
+            keep_better(fits, evaluate_without_fit(problem, hypothesis, values, best))
 
 
 def _add_beside_nuisance(problem: InferenceProblem, base: Fit, fits: Fits) -> None:

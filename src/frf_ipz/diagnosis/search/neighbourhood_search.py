@@ -12,6 +12,7 @@ from frf_ipz.diagnosis.evidence.fit import Fit
 from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, compute_weights
 from frf_ipz.diagnosis.evidence.map_fit import fit_map
 from frf_ipz.diagnosis.search.global_scan import find_best_start, list_components
+from frf_ipz.diagnosis.search.rivals import is_hopeless
 from frf_ipz.diagnosis.search.robust_refinement import COST_RATIO, GAIN, MAX_STEPS, REFINED_ERROR, refine
 
 if TYPE_CHECKING:
@@ -240,8 +241,11 @@ def fit_from_neighbour(problem: InferenceProblem, base: Fit, component: Componen
     if not fit.is_nearly_right:
         return problem.fit(components, values, cost_limit=cost_limit)
     known = fit.values[: len(base.values)]
+    of_all = fit.values if is_same else np.concatenate([known, values[len(known) :]])
     imitator_values = () if is_same else _thin_grid(component.effect.start_values(problem.context, component.location))
     starts = [values, start, *(np.concatenate([known, of_component]) for of_component in imitator_values)]
+    if is_hopeless(problem, fit, hypothesis, [of_all, *starts]):
+        return evaluate_without_fit(problem, hypothesis, values, fit)
     start, nuisance = problem.nearest_start(hypothesis, starts, fit)
     neighbour_fit = fit_map(
         hypothesis, problem.data, start, nuisance=nuisance, iterations=12, tolerance=0.1, cost_limit=cost_limit
@@ -251,6 +255,29 @@ def fit_from_neighbour(problem: InferenceProblem, base: Fit, component: Componen
         if is_same or neighbour_fit.explains_nearly_all
         else problem.fit(components, values, cost_limit=cost_limit)
     )
+
+
+def evaluate_without_fit(problem: InferenceProblem, hypothesis: Hypothesis, values: FloatArray, fit: Fit) -> Fit:
+    """Evaluate components that are not worth a fit, with the modes of another fit.
+
+    Parameters
+    ----------
+    problem : InferenceProblem
+        Data and effects.
+    hypothesis : Hypothesis
+        Its components.
+    values : (n_parameters,) array
+        Physical values of their parameters.
+    fit : Fit
+        With the right modes.
+
+    Returns
+    -------
+    Fit
+        Not converged.
+    """
+    start, nuisance = problem.nearest_start(hypothesis, (values,), fit)
+    return fit_map(hypothesis, problem.data, start, nuisance=nuisance, iterations=0)
 
 
 def _names(hypothesis: Hypothesis) -> list[str]:

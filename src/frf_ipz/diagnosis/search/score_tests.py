@@ -99,8 +99,21 @@ class ScoreTest:
         (n,) array
             The nuisance is fitted by one step.
         """
-        misfits = self.data.misfits(values) + (self.columns @ self.whitened_nuisance)[:, None]
-        return np.asarray(0.5 * (self._squares(self.misfit[:, None]) - self._squares(misfits)))
+        own = self.misfit[:, None]
+        return np.asarray(0.5 * (self._squares(own) - self._squares(self.without_nuisance(values))))
+
+    def costs_of(self, values: ComplexArray) -> FloatArray:
+        """Half the sums of squares that FRFs, (n_points, n_frfs, n), leave beside one step of the nuisance, (n,)."""
+        return np.asarray(0.5 * self._squares(self.without_nuisance(values)))
+
+    def without_nuisance(self, values: ComplexArray) -> FloatArray:
+        """Whitened misfits of FRFs with the nuisance of the base, as they would be without it, (n_data, n) array."""
+        return np.asarray(self.data.misfits(values) + (self.columns @ self.whitened_nuisance)[:, None])
+
+    def explained_by_nuisance(self, misfits: FloatArray) -> FloatArray:
+        """Give what the nuisance explains of misfits, (n_data, n): (n_nuisance, n) array; its squares are taken off."""
+        explained = linalg.solve_triangular(self.factor, self.columns.T @ misfits, lower=True, check_finite=False)
+        return np.asarray(explained)
 
     def score_changes(self, changes: ComplexArray) -> tuple[FloatArray, FloatArray]:
         """Find the best sizes of changes, and the gain of each.
@@ -116,18 +129,15 @@ class ScoreTest:
             Sizes may be negative; gains in log-likelihood.
         """
         white = self.data.slopes(self.response, changes)
-        explained = linalg.solve_triangular(self.factor, self.columns.T @ white, lower=True, check_finite=False)
-        misfit_explained = linalg.solve_triangular(
-            self.factor, self.columns.T @ self.misfit, lower=True, check_finite=False
-        )
+        explained = self.explained_by_nuisance(white)
+        misfit_explained = self.explained_by_nuisance(self.misfit[:, None])[:, 0]
         squares = np.maximum(np.sum(white**2, 0) - np.sum(explained**2, 0), 1e-9 * np.sum(white**2, 0) + 1e-300)
         products = self.misfit @ white - misfit_explained @ explained
         return products / squares, 0.5 * products**2 / squares
 
     def _squares(self, misfits: FloatArray) -> FloatArray:
         """Sum the squares of misfits, (n_data, n), that the nuisance cannot explain."""
-        explained = linalg.solve_triangular(self.factor, self.columns.T @ misfits, lower=True)
-        return np.asarray(np.sum(misfits**2, 0) - np.sum(explained**2, 0))
+        return np.asarray(np.sum(misfits**2, 0) - np.sum(self.explained_by_nuisance(misfits) ** 2, 0))
 
 
 def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> ScoreTest:
