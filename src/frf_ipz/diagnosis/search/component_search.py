@@ -294,6 +294,8 @@ def _fit_rivals(
 ) -> None:
     """Fit what may explain as much as one that explains nearly all; of each other effect say how far behind it is."""
     for components, values in candidates:
+        if components[-1].key in fits:  # candidates may have stepped to one location
+            continue
         hypothesis = problem.make_hypothesis(components)
         if not is_hopeless(problem, best, hypothesis, (values,)):
             keep_better(fits, problem.fit(components, values, cost_limit=find_cost_limit(fits.values())))
