@@ -22,7 +22,7 @@ def stage():
     model, responses, lines_hz = wafer_stage.make_stage(SEED)
     fit = frf_ipz.fit_modes(wafer_stage.measure(responses, lines_hz, SEED))
     reduced = frf_ipz.reduce_model(fit, model, points=wafer_stage.POINTS)
-    return fit, reduced, frf_ipz.update_model(fit, reduced), responses, lines_hz
+    return fit, reduced, frf_ipz.update_model(fit, reduced, fe_model=model), responses, lines_hz
 
 
 def test_no_mode_is_false(stage):

@@ -3,7 +3,8 @@
 The metric of a minimal change is the prior's: a change is small where it is likely. Three kinds of parameters are
 built here, and a diagnosis may bring its own.
 
-- Parts of the FE model (elements, springs, groups): the logarithm of a factor on each part's stiffness. A prior term
+- Parts of the FE model (elements, springs, groups; of assembled matrices, regions that fade into one another): the
+  logarithm of a factor on each part's stiffness. A prior term
   common to all parts stands for a wrong modulus or thickness, terms whose correlation falls off with the distance for
   segments that are softer or stiffer than modelled.
 - Every symmetric change of the reduced stiffness, relative to ``omega_i omega_j`` in mass-normalised modal
@@ -24,7 +25,7 @@ from frf_ipz.display import Concise
 from frf_ipz.dofs import as_dofs
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.structure import ReducedModel, StructuralModel
-from frf_ipz.updating.regions import Region, reduced_regions
+from frf_ipz.updating.regions import Region, reduced_regions, smooth_regions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -249,7 +250,8 @@ def make_structural_basis(
     Returns
     -------
     ParameterBasis
-        With generic parameters instead of parts where the model has none, or only one.
+        With regions in the place of parts where the model has none, or only one; with generic parameters alone where
+        its matrices do not say where nodes are.
 
     Examples
     --------
@@ -275,10 +277,14 @@ def make_structural_basis(
     require_type("reduced_model", reduced_model, ReducedModel)
     heavy_sensors = as_dofs(sensors, name="sensors")
     regions = reduced_regions(fe_model, reduced_model)
-    if len(regions) < 2:
+    has_parts = len(regions) > 1
+    regions = regions if has_parts else smooth_regions(fe_model, reduced_model)
+    if not regions:
         basis = generic_basis(reduced_model)
     else:
         basis = _part_basis(regions, stiffness=True)
+        if not has_parts:  # regions that fade into one another are no parts to be named
+            basis = replace(basis, regions=())
         if mass:
             basis = join_bases(basis, _part_basis(regions, stiffness=False))
         basis = join_bases(basis, generic_basis(reduced_model, std=GENERIC_STD, common=False))

@@ -9,14 +9,17 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
-from frf_ipz.dofs import Dof, node_dofs
+from frf_ipz.dofs import GENERALISED, Dof, node_dofs
 from frf_ipz.fe.assembly import multiply
+from frf_ipz.fe.stiffness_fields import stiffness_shares
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import Matrix
     from frf_ipz.structure import Part, ReducedModel, StructuralModel
 
 MAX_REGIONS = 150  # finer than any number of poles and zeros resolves
+FIELDS = 16  # smooth fields resolve what is some four of them along and across a structure, as the lowest modes do
+MOST_FIELD_DOFS = 10_000  # of a model of matrices: beyond, their shares cost more than its modes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -28,7 +31,7 @@ class Region:
     name : str
         In words.
     kind : str
-        ``element``, ``spring`` or ``group``.
+        ``element``, ``spring``, ``group`` or ``region``.
     nodes : tuple of int
         The nodes it touches.
     coordinates_m : (3,) array
@@ -70,6 +73,73 @@ def reduced_regions(fe_model: StructuralModel, reduced_model: ReducedModel) -> t
         for members in _clusters(coordinates, MAX_REGIONS)
     ]
     return tuple(region for region in regions if np.abs(region.stiffness).max() > 0)
+
+
+def smooth_regions(fe_model: StructuralModel, reduced_model: ReducedModel) -> tuple[Region, ...]:
+    """Divide a model that is given by its matrices into regions that fade into one another.
+
+    Parameters
+    ----------
+    fe_model : StructuralModel
+        The FE model.
+    reduced_model : ReducedModel
+        Its reduced model.
+
+    Returns
+    -------
+    tuple of Region
+        Their matrices sum to those of the model. None where the nodes have no positions, DOFs have no node, all are
+        joined with all as in a super-element, the stiffness holds a negative one that is meant (no material has it), or
+        the model is too large.
+    """
+    dofs, coordinates = fe_model.all_dofs, fe_model.geometry.coordinates_m
+    n_dofs, count = len(dofs), min(FIELDS, len(coordinates) // 2)
+    is_sparse = 2 * fe_model.stiffness_all.nnz < n_dofs**2
+    if fe_model.kind != "matrices" or fe_model.allows_negative_stiffness or not is_sparse:
+        return ()
+    if fe_model.geometry.is_schematic or count < 2:
+        return ()
+    row_of = {int(node): row for row, node in enumerate(fe_model.geometry.nodes)}
+    has_places = all(dof.node in row_of and dof.direction != GENERALISED for dof in dofs)
+    motion, known = motion_of_all_dofs(fe_model, reduced_model)
+    if not has_places or not known.all() or n_dofs > MOST_FIELD_DOFS:
+        return ()
+    clusters = _clusters(coordinates, count)
+    centres = np.array([coordinates[members].mean(axis=0) for members in clusters])
+    weights = _fading_weights(coordinates, centres)
+    if weights is None:
+        return ()
+    of_dofs = weights[[row_of[dof.node] for dof in dofs]]
+    stiffness = stiffness_shares(fe_model.stiffness_all, dofs, fe_model.geometry, of_dofs)
+    mass = sparse.coo_array(fe_model.mass_all)
+    rows, columns = mass.coords
+    regions = []
+    for number, (members, centre, share) in enumerate(zip(clusters, centres, stiffness, strict=True)):
+        entries = mass.data * (of_dofs[rows, number] + of_dofs[columns, number]) / 2
+        nodes = tuple(int(node) for node in fe_model.geometry.nodes[members])
+        middle = int(np.argmin(np.linalg.norm(coordinates[members] - centre, axis=1)))
+        regions.append(
+            Region(
+                name=f"the region around node {nodes[middle]}",
+                kind="region",
+                nodes=nodes,
+                coordinates_m=centre,
+                mass=_share(motion, sparse.csr_array(sparse.coo_array((entries, (rows, columns)), shape=mass.shape))),
+                stiffness=_share(motion, share),
+            )
+        )
+    return tuple(regions)
+
+
+def _fading_weights(coordinates: FloatArray, centres: FloatArray) -> FloatArray | None:
+    """Weights of each node in each region, which sum to 1 and fade over the distance of neighbouring centres."""
+    apart = np.linalg.norm(centres[:, None] - centres, axis=2)
+    spacing = float(np.sort(apart, axis=1)[:, 1].mean())
+    if spacing == 0.0:
+        return None
+    squares = (np.linalg.norm(coordinates[:, None] - centres, axis=2) / spacing) ** 2
+    weights = np.exp(-(squares - squares.min(axis=1, keepdims=True)) / 2)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
 def motion_of_all_dofs(fe_model: StructuralModel, reduced_model: ReducedModel) -> tuple[FloatArray, BoolArray]:

@@ -217,7 +217,7 @@ def iterate(
         scales[:-1] = likely
     whitened = np.zeros(sum(term.root.shape[1] for term in phase.terms)) if start is None else start
     state = _Iterate(whitened, unwhiten(phase.terms, scales[:-1], whitened), tracked, phase.errors(tracked))
-    nonlinearity, rows, converged = CURVATURE * state.error**2, [], False
+    nonlinearity, rows, converged, best = CURVATURE * state.error**2, [], False, state
     for iteration in range(1, (max_iterations or MAX_ITERATIONS) + 1):
         slopes = phase.slopes(state.theta, state.tracked)
         data = state.error + slopes @ state.theta
@@ -229,15 +229,17 @@ def iterate(
         if searching:
             new_scales = most_likely_scales(linear, terms, scales)
             state = replace(state, whitened=_rescaled(phase.terms, scales / new_scales, state.whitened))
-            scales = new_scales
+            best, scales = state, new_scales  # under other scales another change is the likeliest
         step, scales[-1] = step_by_discrepancy(linear, scales[:-1], float(scales[-1]))
         noise = phase.noise.plus((scales[-1] * phase.slack) ** 2)
         before = state
         state, fraction = _line_search(phase, scales, before, step.mean, linear)
         predicted = before.error + fraction * (data - _explained(linear, scales[:-1], step.mean) - before.error)
         deviation = np.abs(state.error - predicted)
+        is_nearer = _cost(state, noise) < _cost(best, noise)
+        best = state if is_nearer else best
         if fraction:
-            nonlinearity = CURVATURE * deviation
+            nonlinearity = np.maximum(CURVATURE * deviation, 0.0 if is_nearer else nonlinearity)
         else:
             nonlinearity = STALLED * np.maximum(nonlinearity, np.sqrt(noise.variance))
         row = _history_row(terms, iteration, state.error, noise, step, scales, fraction)
@@ -259,6 +261,12 @@ def iterate(
         rows=tuple(rows),
         converged=converged,
     )
+
+
+def _cost(state: _Iterate, noise: TargetNoise) -> float:
+    """Weigh change and misfit together, without the noise that stands for curvature."""
+    misfit = linearise((), state.error, noise).square(state.error, 0.0)
+    return float(state.whitened @ state.whitened) + misfit
 
 
 def _explained(linear: Linearised, scales: FloatArray, mean: FloatArray) -> FloatArray:
