@@ -12,7 +12,7 @@ from frf_ipz.assessment.causes import places
 from frf_ipz.assessment.causes.cause import Situation, log_evidence
 from frf_ipz.assessment.causes.cost_bounds import bound_costs
 from frf_ipz.assessment.causes.likely_cause import KINDS, find_likely_cause
-from frf_ipz.assessment.causes.modal_comparison import computed_modes, measured_modes
+from frf_ipz.assessment.causes.modal_comparison import computed_modes, log_likelihood, measured_modes
 
 OUTPUTS, INPUTS = ("8:+z", "15:+z", "21:+z"), ("11:+z", "19:+z")
 LINES = np.arange(5.0, 900.0, 0.5)
@@ -260,6 +260,19 @@ def test_what_a_nearly_right_model_is_off_is_no_cause_beside_modes_that_it_lacks
     stiffer = replace(computed, frequency_hz=computed.frequency_hz / 1.2)
     cause = find_likely_cause(Situation(measured=measured, computed=stiffer, model=beam, **files))
     assert "youngs_modulus_Pa" in cause.line_or_key
+
+
+def test_a_mode_just_inside_the_band_may_have_been_measured_just_outside(fit):
+    """An edge of the band that passes a computed mode costs what its frequency is off, and not all that it shows."""
+    computed = computed_modes(frf_ipz.solve_modes(frf_ipz.make_beam(**BEAM), n_modes=24))
+    edge_hz = computed.frequency_hz[len(measured_modes(fit).frequency_hz)]
+    products = computed.products(FRF, {}, {}).astype(complex)
+    below, above, far_above = (
+        log_likelihood(replace(measured_modes(fit), band_hz=(5.0, top * edge_hz)), computed.frequency_hz, products)
+        for top in (0.999, 1.001, 1.3)
+    )
+    assert 0 <= below - above < 0.01
+    assert below - far_above > 4
 
 
 def test_the_time_in_ms_is_named(fit):

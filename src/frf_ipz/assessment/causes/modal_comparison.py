@@ -191,10 +191,16 @@ def log_likelihood(measured: MeasuredModes, frequency_hz: FloatArray, products: 
     costs = _costs(measured, frequency_hz, products)
     not_computed = costs_of_absence(measured, measured.products)
     rows, columns = _assign(costs, not_computed)
-    inside = (frequency_hz > measured.band_hz[0]) & (frequency_hz < measured.band_hz[1])
-    not_measured = inside * costs_of_absence(measured, products)
+    not_measured = np.minimum(costs_of_absence(measured, products), _costs_outside(measured, frequency_hz))
     alone = np.delete(not_computed, rows).sum() + np.delete(not_measured, columns).sum()
     return float(-costs[rows, columns].sum() - alone)
+
+
+def _costs_outside(measured: MeasuredModes, frequency_hz: FloatArray) -> FloatArray:
+    """Costs of frequencies that are off by as much as it takes to lie outside of the band: 0 where they do."""
+    to_edges = np.log(frequency_hz / measured.band_hz[0]), np.log(measured.band_hz[1] / frequency_hz)
+    nearest = np.minimum(*to_edges).clip(min=0)
+    return np.asarray(np.log1p((nearest / FREQUENCY_SCALE) ** 2))
 
 
 def _assign(costs: FloatArray, alone: FloatArray) -> tuple[IntArray, IntArray]:
