@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.numerics.noise_floor import above_noise
+
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
     from frf_ipz.frf import FrfSet
@@ -58,7 +60,7 @@ class MeasuredPoints:
     @cached_property
     def is_heard(self) -> np.ndarray:
         """(n_lines, n_frfs) bool array: where an FRF stands above its noise."""
-        return np.abs(self.measured) > self.noise
+        return above_noise(np.abs(self.measured), self.noise)
 
     @property
     def is_relative(self) -> bool:

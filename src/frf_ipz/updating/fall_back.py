@@ -15,6 +15,7 @@ import numpy as np
 
 from frf_ipz.fe.response import compute_frfs
 from frf_ipz.late_imports import import_late
+from frf_ipz.numerics.noise_floor import above_noise
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
 
 if TYPE_CHECKING:
@@ -99,7 +100,7 @@ def _heard(fit: ModalFit) -> tuple[ComplexArray, FloatArray, BoolArray]:
     """Lines, rad/s, magnitudes of the fitted FRFs there, and which of them stand above their noise."""
     s: ComplexArray = np.asarray(2j * np.pi * fit.frequency_hz)
     measured = np.abs(fit.model(s))
-    return s, measured, measured > fit.value_std
+    return s, measured, above_noise(measured, fit.value_std)
 
 
 def _noise_db(fit: ModalFit) -> float:

@@ -164,7 +164,7 @@ def select_moving_nodes(structure: Structure, modes: Modes, band: tuple[float, f
 
 
 def is_reached(structure: Structure, modes: Modes, set_up: SetUp) -> bool:
-    """Whether some force of a test moves each of its sensors and points of interest in some mode of the band.
+    """Whether some force moves each sensor and point of interest in some mode of the band, and each force some of them.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def is_reached(structure: Structure, modes: Modes, set_up: SetUp) -> bool:
     Returns
     -------
     bool
-        False where a motion has no part in what the forces excite, as in the other plane of a symmetric frame.
+        False where the forces excite nothing of a motion, as in the other plane of a symmetric frame.
     """
     inside = (modes.frequencies_hz >= set_up.band_hz[0]) & (modes.frequencies_hz <= set_up.band_hz[1])
 
@@ -186,8 +186,8 @@ def is_reached(structure: Structure, modes: Modes, set_up: SetUp) -> bool:
     largest = np.abs(shapes_at(structure.nodes)).max(axis=0)
     motions = shapes_at((*(sensor.node for sensor in set_up.sensors), *set_up.points)) / largest
     forces = shapes_at(node for node, _ in set_up.excited_points) / largest
-    reach = np.abs(motions[:, None] * forces).max(axis=(1, 2))
-    return bool(reach.min() > LEAST_REACH)
+    reaches = np.abs(motions[:, None] * forces).max(axis=2) > LEAST_REACH
+    return bool(reaches.any(axis=1).all() and reaches.any(axis=0).all())
 
 
 def draw_set_up(

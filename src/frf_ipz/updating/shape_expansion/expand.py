@@ -78,7 +78,8 @@ def with_expanded_shapes(
     if len(measured.outputs) + len(measured.inputs) > MOST_ENDS:
         return updated
     own = errors_at_points(fit, updated)
-    if np.median(own) <= SIXTH * GAIN_MARGIN_DB:
+    own_db = float(np.median(own[np.isfinite(own)])) if np.isfinite(own).any() else 0.0
+    if own_db <= SIXTH * GAIN_MARGIN_DB:
         return updated
     places = attachment_places(problem.model, measured, geometry)
     causes = [find_attached_masses(problem.model, measured, tried) for tried in dict.fromkeys(((), places))]
@@ -86,7 +87,7 @@ def with_expanded_shapes(
     errors = [np.inf if left_out is None else float(np.median(left_out.error_db)) for left_out in left_out_of]
     best = int(np.argmin(errors))
     loaded, left_out = causes[best], left_out_of[best]
-    if left_out is None or errors[best] >= np.median(own):
+    if left_out is None or errors[best] >= own_db:
         return updated
     modes = expand_modes(loaded.model, measured, error=loaded.error, is_scale_known=fit.unknown_scale == "none")
     if fit.unknown_scale == "none" and abs(20 * np.log10(modes.gain)) > HALF * GAIN_MARGIN_DB:
@@ -99,7 +100,7 @@ def with_expanded_shapes(
         points=tuple(point.name for point in left_out.points),
         ratio=np.exp(left_out.log_ratio),
         error_db=left_out.error_db,
-        updated_error_db=own,
+        updated_error_db=own[np.isfinite(own)],
         stiffness_ratio=loaded.stiffness_ratio,
         masses=loaded.masses,
         split=_split_modes(modes),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray
+from frf_ipz.numerics.noise_floor import above_noise
 from frf_ipz.pairing.poles import measured_amplitudes
 from frf_ipz.updating.shape_expansion.expanded_model import expand_modes, receptance
 from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes
@@ -92,7 +93,7 @@ def leave_points_out(fit: ModalFit, model: ReducedModel, *, error: float) -> Lef
         return None
     chosen = [points[place] for place in np.unique(np.linspace(0, len(points) - 1, MOST).round().astype(int))]
     s = _lines(fit)
-    measured = fit.model(s)
+    measured = _heard(fit, s)
     judged = {point: _judge(fit, model, point, _without(fit, point), error, s, measured) for point in chosen}
     known = {point: judgement for point, judgement in judged.items() if judgement is not None}
     if not known:
@@ -124,10 +125,10 @@ def errors_at_points(fit: ModalFit, updated: UpdatedModel) -> FloatArray:
     Returns
     -------
     (n_points,) array
-        As `LeftOutPoints` has them, dB.
+        As `LeftOutPoints` has them, dB; NaN for a point where nothing is heard.
     """
     points, s = side_with_more(fit), _lines(fit)
-    measured, computed = fit.model(s), updated.compute_frfs(fit.labels, s)
+    measured, computed = _heard(fit, s), updated.compute_frfs(fit.labels, s)
     columns = [
         [number for number, label in enumerate(fit.labels) if point in (label.output_dof, label.input_dof)]
         for point in points
@@ -143,22 +144,32 @@ def _lines(fit: ModalFit) -> ComplexArray:
     return np.asarray(2j * np.pi * np.geomspace(low, fit.band_hz[1], LINES))
 
 
+def _heard(fit: ModalFit, s: ComplexArray) -> ComplexArray:
+    """Fitted FRFs; NaN where they do not stand above the noise that is left in them."""
+    values = fit.model(s)
+    nearest = np.abs(fit.frequency_hz[:, None] - s.imag / (2 * np.pi)).argmin(axis=0)
+    return np.where(above_noise(np.abs(values), fit.value_std[nearest]), values, np.nan)
+
+
 def median_error_db(measured: ComplexArray, predicted: ComplexArray, *, is_level_known: bool) -> float:
     """Give the median difference of magnitudes.
 
     Parameters
     ----------
     measured, predicted : (n_lines, n_frfs) complex array
-        FRFs of one point.
+        FRFs of one point; NaN where nothing is heard.
     is_level_known : bool
         Where it is not, one factor is free: the median of the ratios.
 
     Returns
     -------
     float
-        dB.
+        dB; NaN where nothing is heard in any.
     """
-    difference = 20 * np.log10(np.abs(predicted) / np.abs(measured))
+    heard = np.isfinite(measured)
+    difference = 20 * np.log10(np.abs(predicted[heard]) / np.abs(measured[heard]))
+    if not heard.any():
+        return np.nan
     if not is_level_known:
         difference = difference - np.median(difference)
     return float(np.median(np.abs(difference)))
@@ -199,7 +210,7 @@ def _judge(
     variance = np.array([row @ shape.covariance @ row for shape in modes.shapes])
     opposite = others.inputs if is_output else others.outputs
     frfs = [number for number, (end, partner) in enumerate(ends) if end == point and partner in opposite]
-    if not frfs:
+    if not np.isfinite(measured[:, frfs]).any():
         return None
     predicted, at_partners = [], []
     for number in frfs:
