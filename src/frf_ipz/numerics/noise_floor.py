@@ -13,8 +13,8 @@ def above_noise(magnitude: FloatArray, std: FloatArray) -> BoolArray:
     """Tell which magnitudes stand above what noise alone reaches.
 
     The squared modulus of complex normal noise over its variance is exponentially distributed: the largest of ``n``
-    exceeds ``ln(n / chance)`` with that chance. A limit at the standard deviation itself would let through a third of an
-    FRF that is nothing but noise.
+    exceeds ``ln(n / chance)`` with that chance. A limit at the standard deviation itself lets through a third of an FRF
+    that is nothing but noise.
 
     Parameters
     ----------
