@@ -11,6 +11,7 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader
+from frf_ipz.hdf5_heaps import require_heaps
 from frf_ipz.input_files import open_input, require_expanded
 
 if TYPE_CHECKING:
@@ -145,8 +146,10 @@ def open_tree(path: Path, kind: str, *, most_bytes: int) -> Iterator[Hdf5Tree]:
     FileFormatError
         If it is none, or is damaged.
     """
-    with open_input(path) as stream, errors_of_reader(path, kind), h5py.File(stream, "r") as file:
-        yield Hdf5Tree(path=path, file=file, file_bytes=path.stat().st_size, most_bytes=most_bytes)
+    with open_input(path) as stream:
+        require_heaps(path)
+        with errors_of_reader(path, kind), h5py.File(stream, "r") as file:
+            yield Hdf5Tree(path=path, file=file, file_bytes=path.stat().st_size, most_bytes=most_bytes)
 
 
 def texts_of(values: object) -> tuple[str, ...] | None:
