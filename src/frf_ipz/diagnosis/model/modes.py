@@ -132,9 +132,8 @@ class Modes:
         How they change with positions, 1/m.
     vectors : (q_basis, q) array
         The modes in terms of the basis.
-    viscous : (n, n) array, optional
-        What damping couples the first modes by, besides their ratios: all modes, where a damping matrix of the model
-        couples them.
+    viscous : (q, q) array, optional
+        What the model's damping matrix couples modes by; what it damps each mode by is in its ratio.
     """
 
     omega: FloatArray
@@ -225,10 +224,6 @@ def scatter_modes(
     ratio = modified.stated_ratio.copy()
     ratio[:m] *= 1 + nuisance_values.damping
     viscous = modal_coupling(turned.T @ basis.damping @ turned) if modified.is_coupled else None
-    if nuisance_values.coupling.any():
-        size = np.sqrt(2 * modified.stated_ratio[:m] * omega[:m])
-        viscous = np.zeros((m, m)) if viscous is None else viscous
-        viscous[:m, :m] += rotation.T @ (np.outer(size, size) * nuisance_values.coupling) @ rotation
     return Modes(
         omega=omega,
         squares=scattered,

@@ -2,12 +2,11 @@
 
 Small errors of mass and stiffness, wherever they are, act on the modes of the band as symmetric matrices: stiffness
 ``omega_i omega_j kappa_ij`` and mass ``mu_ij``. Their diagonals are the scatter of the frequencies, the rest that of
-the shapes, and with it of the zeros. Damping is such a matrix too: its diagonal holds the ratios of the modes, and the
-rest couples them, so that modes which lie close together are complex; what a mass or a spring changes need not leave
-them apart. Positions and directions of sensors and excited points, and gains of channels come beside. A tolerance is
-the half width of what can be, so that the standard deviation is the tolerance over the square root of three. Nothing
-that is stated by a tolerance lies far outside of it: there the prior rises much faster than a normal one. Shapes of
-modes, and all about modes beyond the band, are stated by no tolerance and keep a normal prior.
+the shapes, and with it of the zeros. Damping ratios of modes, positions and directions of sensors and excited points,
+and gains of channels come beside. A tolerance is the half width of what can be, so that the standard deviation is the
+tolerance over the square root of three. Nothing that is stated by a tolerance lies far outside of it: there the prior
+rises much faster than a normal one. Shapes of modes, and all about modes beyond the band, are stated by no tolerance
+and keep a normal prior.
 
 Near an excited point FRFs contain the local compliance around the contact, which depends on its size and which no mesh
 represents well: the compliance of all modes beyond those with scatter is not known exactly.
@@ -50,7 +49,7 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import AnyDof
 
 UNIFORM_STD = 1 / np.sqrt(3.0)  # standard deviation of what is uniform between -1 and 1
-OFF_DIAGONAL = 0.5  # kappa, mu and damping between two modes, over those of one: fields average out
+OFF_DIAGONAL = 0.5  # kappa and mu between two modes, over those of one: fields average out
 MASS_PART = 0.5  # tolerance of masses over that of stiffness
 SUSPENSION_FREQUENCY = 0.02  # frequency of a free structure on its suspension, over its first elastic one
 MODES_BEYOND = 2.0  # times the top of the band: modes with scatter of their own
@@ -77,8 +76,6 @@ class NuisanceValues:
         Relative errors of stiffness and mass on the first modes, symmetric.
     damping : (m,) array
         Relative errors of damping ratios.
-    coupling : (m, m) array
-        What damping couples two modes by, over the geometric mean of what it damps them by; symmetric, diagonal 0.
     suspension : (n_rigid,) array
         Squared frequencies of rigid-body modes, (rad/s)^2.
     output_shift, input_shift : (n, n_axes) array
@@ -92,7 +89,6 @@ class NuisanceValues:
     kappa: FloatArray
     mu: FloatArray
     damping: FloatArray
-    coupling: FloatArray
     suspension: FloatArray
     output_shift: FloatArray
     input_shift: FloatArray
@@ -110,8 +106,6 @@ class NuisanceBlocks:
         Upper triangles of kappa and mu, row by row.
     damping : slice
         Relative errors of damping ratios.
-    coupling : slice
-        Of modes by damping: the triangle above the diagonal, row by row.
     suspension : slice
         Squared frequencies of rigid-body modes.
     output_shifts, input_shifts : slice
@@ -126,7 +120,6 @@ class NuisanceBlocks:
     stiffness: slice
     mass: slice
     damping: slice
-    coupling: slice
     suspension: slice
     output_shifts: slice
     input_shifts: slice
@@ -152,8 +145,6 @@ class NuisancePrior:
         Standard deviations.
     damping_std : (m,) array
         Of damping ratios, relative.
-    coupling_std : (m, m) array
-        Of the coupling by damping, relative; diagonal 0.
     suspension_std : float
         Of squared frequencies of rigid-body modes, (rad/s)^2.
     axes : tuple of str
@@ -177,7 +168,6 @@ class NuisancePrior:
     kappa_std: FloatArray
     mu_std: FloatArray
     damping_std: FloatArray
-    coupling_std: FloatArray
     suspension_std: float
     axes: tuple[str, ...]
     shift_std: FloatArray
@@ -192,11 +182,6 @@ class NuisancePrior:
     def pairs(self) -> tuple[IntArray, IntArray]:
         """Rows and columns of the upper triangle of kappa and mu."""
         return _triangle(self.n_modes)
-
-    @property
-    def couples(self) -> tuple[IntArray, IntArray]:
-        """Rows and columns of the triangle above the diagonal of the coupling."""
-        return _triangle(self.n_modes, 1)
 
     @property
     def blocks(self) -> NuisanceBlocks:
@@ -312,7 +297,6 @@ class NuisancePrior:
             kappa=self._symmetric(values[blocks.stiffness]) * self.kappa_std,
             mu=self._symmetric(values[blocks.mass]) * self.mu_std,
             damping=np.maximum(values[blocks.damping] * self.damping_std, -0.95),
-            coupling=np.clip(self._symmetric(values[blocks.coupling], above=1) * self.coupling_std, -1.0, 1.0),
             suspension=values[blocks.suspension] * self.suspension_std,
             output_shift=values[blocks.output_shifts].reshape(self.n_outputs, n_axes) * self.shift_std,
             input_shift=values[blocks.input_shifts].reshape(self.n_inputs, n_axes) * self.shift_std,
@@ -320,8 +304,8 @@ class NuisancePrior:
             gains=np.clip(values[blocks.gains] * self.gain_std, -MAX_GAIN, MAX_GAIN),
         )
 
-    def _symmetric(self, triangle: FloatArray, *, above: int = 0) -> FloatArray:
-        rows, columns = _triangle(self.n_modes, above)
+    def _symmetric(self, triangle: FloatArray) -> FloatArray:
+        rows, columns = self.pairs
         matrix = np.zeros((self.n_modes, self.n_modes))
         matrix[rows, columns] = matrix[columns, rows] = triangle
         return matrix
@@ -340,7 +324,6 @@ def _place_blocks(
         stiffness=n_pairs,
         mass=n_pairs,
         damping=n_modes,
-        coupling=n_pairs - n_modes,
         suspension=n_rigid,
         output_shifts=n_output_shifts,
         input_shifts=n_input_shifts,
@@ -350,8 +333,8 @@ def _place_blocks(
 
 
 @cache
-def _triangle(size: int, above: int = 0) -> tuple[IntArray, IntArray]:
-    rows, columns = np.triu_indices(size, above)
+def _triangle(size: int) -> tuple[IntArray, IntArray]:
+    rows, columns = np.triu_indices(size)
     return rows.astype(np.int64), columns.astype(np.int64)
 
 
@@ -390,7 +373,6 @@ def make_nuisance_prior(basis: Basis, layout: Layout, options: DiagnoseOptions) 
     span = measure_extents(basis.model)
     directions = {dof.direction for dof in (*(dof for _, dof in layout.outputs), *layout.inputs)}
     axes = tuple(axis for axis in span if directions != {axis})
-    damping_std = _damping_std(options.damping_tolerance * UNIFORM_STD, growth, n_rigid)
     shift_std = np.array([options.position_tolerance_m_per_m * span[axis] * UNIFORM_STD for axis in axes])
     turned = _list_turns(basis, layout)
     turn_std = np.full(len(turned), np.deg2rad(options.angle_tolerance_deg) * UNIFORM_STD)
@@ -400,8 +382,7 @@ def make_nuisance_prior(basis: Basis, layout: Layout, options: DiagnoseOptions) 
         n_rigid=n_rigid,
         kappa_std=kappa,
         mu_std=mu,
-        damping_std=damping_std,
-        coupling_std=_coupling_std(damping_std, n_rigid),
+        damping_std=_damping_std(options.damping_tolerance * UNIFORM_STD, growth, n_rigid),
         suspension_std=(SUSPENSION_FREQUENCY * first) ** 2,
         axes=(*axes, *turned),
         shift_std=np.concatenate([shift_std, turn_std]),
@@ -433,15 +414,6 @@ def _damping_std(stated: float, growth: FloatArray, n_rigid: int) -> FloatArray:
     """Relative standard deviations of damping ratios: stated ratios are measured within the band."""
     std = np.maximum(stated, np.minimum(stated * growth, UNSTATED_SPREAD))
     std[:n_rigid] = UNSTATED_SPREAD
-    return std
-
-
-def _coupling_std(damping_std: FloatArray, n_rigid: int) -> FloatArray:
-    """Relative standard deviations of what damping couples modes by, at most 1 since every motion loses energy."""
-    of_modes = np.minimum(damping_std, UNIFORM_STD)
-    std = OFF_DIAGONAL * np.sqrt(np.outer(of_modes, of_modes))
-    std[:n_rigid] = std[:, :n_rigid] = 0.0
-    np.fill_diagonal(std, 0.0)
     return std
 
 

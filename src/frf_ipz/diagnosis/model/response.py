@@ -127,13 +127,10 @@ def _solve(modes: Modes, modulus: ComplexArray, loads: FloatArray, s: ComplexArr
     """Modal motion under loads, (n_points, q, n_loads)."""
     damping = 2 * modes.ratio * np.sqrt(np.abs(modes.squares))
     denominators = s[:, None] ** 2 + s[:, None] * damping + modulus * modes.squares
-    motion = np.asarray(loads.T[None] / denominators[:, :, None])
     if modes.viscous is None:
-        return motion
-    n = len(modes.viscous)
-    relative = s[:, None, None] * modes.viscous / denominators[:, :n, None] + np.eye(n)
-    motion[:, :n] = np.linalg.solve(relative, motion[:, :n])
-    return motion
+        return np.asarray(loads.T[None] / denominators[:, :, None])
+    dynamic = s[:, None, None] * modes.viscous + denominators[:, :, None] * np.eye(len(damping))
+    return np.asarray(np.linalg.solve(dynamic, np.broadcast_to(loads.T, (len(s), *loads.T.shape))), np.complex128)
 
 
 def _coupled_stiffness(
@@ -201,7 +198,6 @@ def nuisance_jacobian(response: Response, nuisance_prior: NuisancePrior, layout:
     jacobian[:, :, blocks.stiffness] = products * (omega[i] * omega[j] * nuisance_prior.kappa_std[i, j])
     jacobian[:, :, blocks.mass] = products * nuisance_prior.mu_std[i, j] * (s**2)[:, None, None]
     jacobian[:, :, blocks.damping] = changed * damping * s[:, None, None]
-    jacobian[:, :, blocks.coupling] = _coupling_jacobian(response, nuisance_prior, outputs, inputs)
     jacobian[:, :, blocks.suspension] = (
         -chain * outputs[:, :, rigid] * inputs[:, :, rigid] * nuisance_prior.suspension_std
     )
@@ -211,17 +207,6 @@ def nuisance_jacobian(response: Response, nuisance_prior: NuisancePrior, layout:
     jacobian[:, :, blocks.local] = chain * np.diag(nuisance_prior.local_std)
     jacobian[:, :, blocks.gains] = response.values[:, :, None] * (layout.gain_signs * nuisance_prior.gain_std)
     return jacobian
-
-
-def _coupling_jacobian(
-    response: Response, nuisance_prior: NuisancePrior, outputs: ComplexArray, inputs: ComplexArray
-) -> ComplexArray:
-    """Differentiate FRFs by what damping couples modes by, from motions without scatter, (n_points, n_frfs, m)."""
-    modes, (i, j) = response.modes, nuisance_prior.couples
-    damping = 2 * modes.stated_ratio * modes.omega
-    products = outputs[:, :, i] * inputs[:, :, j] + outputs[:, :, j] * inputs[:, :, i]
-    size = np.sqrt(damping[i] * damping[j]) * nuisance_prior.coupling_std[i, j]
-    return np.asarray(products * (-response.s[:, None] * response.chain)[:, :, None] * size)
 
 
 def _shift_jacobians(response: Response, nuisance_prior: NuisancePrior, layout: Layout) -> list[ComplexArray]:

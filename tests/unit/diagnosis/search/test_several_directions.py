@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy import linalg
 
 from diagnosed import measured as measure
 from diagnosed import problem_of
@@ -109,22 +108,3 @@ def test_a_score_test_promises_what_a_small_mass_in_all_directions_gains(nominal
     size = SMALL_STEP * problem.context.mass_kg
     sizes, gains = test.score_changes(test.change(hypothesis, np.array([size]))[:, :, None])
     assert_allclose([best.values[0], -best.cost], [size * sizes[0], gains[0]], rtol=LINEAR)
-
-
-def test_a_mass_is_found_where_close_modes_are_damped_unlike(nominal):
-    """The damping of the structure is what it was: between the modes that the mass makes of close ones it couples."""
-    mass, stiffness = nominal.mass_all.toarray(), nominal.stiffness_all.toarray()
-    stiffness += 1e6 * np.kron(np.eye(N_NODES), np.diag([0.0, 0.0, 1.0]))
-    squares, shapes = linalg.eigh(stiffness, mass)
-    ratios = 0.01 * (1 + 0.25 * np.random.default_rng(2).uniform(-1, 1, len(squares)))
-    damping = mass @ shapes @ np.diag(2 * ratios * np.sqrt(squares)) @ shapes.T @ mass
-    heavier = mass + np.diag(np.where(np.arange(len(mass)) // 3 == NODE - 1, 0.8, 0.0))
-    model, true = (
-        StructuralModel.from_matrices(matrix, stiffness, dofs=nominal.dofs, **stated)
-        for matrix, stated in ((mass, {"modal_damping": 0.01}), (heavier, {"damping": damping}))
-    )
-    problem = problem_of(model, measure(true, NAMES, noise=1e-4), ("added_mass",))
-    mass_there = Component(effect=problem.effects["added_mass"], location=Location.at_node(NODE, "x"), n_locations=1)
-    fit = problem.fit((mass_there,), np.array([0.79]))
-    assert fit.explains_nearly_all
-    assert fit.values[0] == pytest.approx(0.8, rel=0.01)
