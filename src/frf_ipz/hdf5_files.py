@@ -147,7 +147,7 @@ def open_tree(path: Path, kind: str, *, most_bytes: int) -> Iterator[Hdf5Tree]:
         If it is none, or is damaged.
     """
     with open_input(path) as stream:
-        require_heaps(path)
+        require_heaps(path, stream)
         with errors_of_reader(path, kind), h5py.File(stream, "r") as file:
             yield Hdf5Tree(path=path, file=file, file_bytes=path.stat().st_size, most_bytes=most_bytes)
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from frf_ipz.errors import FileFormatError
 
 if TYPE_CHECKING:
+    from io import BufferedReader
     from pathlib import Path
 
 SIGNATURE = b"GCOL\x01\0\0\0"
@@ -20,30 +21,31 @@ WORD = 8  # bytes; everything in a heap is a multiple of it
 FILE = b"\x89HDF\r\n\x1a\n"  # where the file begins, which may be behind a text of another program
 
 
-def require_heaps(path: Path) -> None:
+def require_heaps(path: Path, stream: BufferedReader) -> None:
     """Look at all global heaps of a file.
 
     Parameters
     ----------
     path : Path
         An HDF5 file.
+    stream : BufferedReader
+        Its bytes, opened.
 
     Raises
     ------
     FileFormatError
         If an object of a heap has no size, or one that leaves the heap.
     """
-    with path.open("rb") as stream:
-        if not stream.read(1):
-            return  # there is nothing to map
-        with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            begin = max(data.find(FILE), 0)
-            n_length = _bytes_of_length(data[begin : begin + 2 * WORD])
-            start = data.find(SIGNATURE)
-            while start >= 0:
-                if not _is_whole(data, start, n_length):
-                    raise FileFormatError(path, "is damaged: a heap of its texts has no end; write it again")
-                start = data.find(SIGNATURE, start + WORD)
+    if not stream.peek(1):
+        return  # there is nothing to map
+    with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        begin = max(data.find(FILE), 0)
+        n_length = _bytes_of_length(data[begin : begin + 2 * WORD])
+        start = data.find(SIGNATURE)
+        while start >= 0:
+            if not _is_whole(data, start, n_length):
+                raise FileFormatError(path, "is damaged: a heap of its texts has no end; write it again")
+            start = data.find(SIGNATURE, start + WORD)
 
 
 def _bytes_of_length(first: bytes) -> int:

@@ -9,6 +9,11 @@ from frf_ipz.hdf5_heaps import SIGNATURE, require_heaps
 HEAD = 16  # bytes of a collection, and of an object in it
 
 
+def look_at(path):
+    with path.open("rb") as stream:
+        require_heaps(path, stream)
+
+
 @pytest.fixture(params=[0, 512])
 def file(tmp_path, request):
     """A file with texts, behind a block of another program's or not."""
@@ -23,7 +28,7 @@ def file(tmp_path, request):
 
 
 def test_whole_heaps_are_read(file):
-    require_heaps(file)
+    look_at(file)
     assert file.read_bytes().count(SIGNATURE) > 1
 
 
@@ -35,10 +40,10 @@ def test_an_object_without_an_end_is_damage(file, size):
     data[first + 8 : first + 16] = size.to_bytes(8, "little")
     file.write_bytes(data)
     with pytest.raises(FileFormatError, match="a heap of its texts has no end"):
-        require_heaps(file)
+        look_at(file)
 
 
 def test_an_empty_file_has_no_heap(tmp_path):
     path = tmp_path / "empty.h5"
     path.write_bytes(b"")
-    require_heaps(path)
+    look_at(path)

@@ -109,6 +109,8 @@ class Estimate:
         '1.52 g (95 %: 1.40 to 1.64)'
         >>> frf_ipz.Estimate(value=0.624, std=0.014, low=0.598, high=0.652).in_words("%", -100, less=1)
         '38 % (95 %: 35 to 40)'
+        >>> frf_ipz.Estimate(value=481.0, std=1400.0, low=1.6, high=144480.0).in_words("N/m")
+        '500 N/m (95 %: 0 to 1.4e5)'
         """
         value, *ends = (scale * (number - less) for number in (self.value, self.low, self.high))
         low, high = sorted(ends)
@@ -116,7 +118,8 @@ class Estimate:
         if not (math.isfinite(low) and math.isfinite(high) and high > low):
             return f"{_rounded(value, _last_digit(value, 0.0))}{behind}"
         last = _last_digit(value, (high - low) / (2 * NORMAL_95))
-        return f"{_rounded(value, last)}{behind} (95 %: {_rounded(low, last)} to {_rounded(high, last)})"
+        own = min(last, _last_digit(value, abs(value)))  # less is known of it than its first digit: that is written
+        return f"{_rounded(value, own)}{behind} (95 %: {_rounded(low, last)} to {_rounded(high, last)})"
 
 
 NORMAL_95 = 1.96  # standard deviations
@@ -208,6 +211,7 @@ class Finding:
         return confidence(self.probability)
 
 
+NEARLY_SURE = 0.99  # from here on two digits would write 1
 SURE = 0.999  # a probability above is written as being above; below its complement, as being below
 
 
@@ -226,12 +230,14 @@ def confidence(probability: float) -> str:
 
     Examples
     --------
-    >>> confidence(0.99999), confidence(0.842), confidence(1e-12)
-    ('probability above 0.999', 'probability 0.84', 'probability below 0.001')
+    >>> confidence(0.99999), confidence(0.9961), confidence(0.842), confidence(1e-12)
+    ('probability above 0.999', 'probability 0.996', 'probability 0.84', 'probability below 0.001')
     """
     if probability > SURE:
         return f"probability above {SURE}"
-    return f"probability {probability:.2g}" if probability >= 1 - SURE else f"probability below {1 - SURE:.3f}"
+    if probability < 1 - SURE:
+        return f"probability below {1 - SURE:.3f}"
+    return f"probability {probability:.{2 if probability < NEARLY_SURE else 3}g}"
 
 
 def with_confidence(statement: str, probability: float) -> str:
