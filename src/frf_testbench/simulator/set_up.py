@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -156,11 +155,17 @@ def select_moving_nodes(structure: Structure, modes: Modes, band: tuple[float, f
     list of int
         Nodes, ascending.
     """
-    inside = (modes.frequencies_hz >= band[0]) & (modes.frequencies_hz <= band[1])
     nodes = sorted(structure.nodes)
-    shapes = np.array([structure.row(Point(node, structure.direction)) for node in nodes]) @ modes.shapes[:, inside]
-    best = (np.abs(shapes) / np.abs(shapes).max(axis=0)).max(axis=1)
+    best = np.abs(_relative_motions(structure, modes, band)).max(axis=1)
     return [node for node, value in zip(nodes, best.tolist(), strict=True) if value > margin]
+
+
+def _relative_motions(structure: Structure, modes: Modes, band: tuple[float, float]) -> FloatArray:
+    """Motions of the nodes, ascending, over the largest one of each mode of the band, (n_nodes, n_modes)."""
+    inside = (modes.frequencies_hz >= band[0]) & (modes.frequencies_hz <= band[1])
+    points = [Point(node, structure.direction) for node in sorted(structure.nodes)]
+    shapes = np.array([structure.row(point) for point in points]) @ modes.shapes[:, inside]
+    return np.asarray(shapes / np.abs(shapes).max(axis=0))
 
 
 def is_reached(structure: Structure, modes: Modes, set_up: SetUp) -> bool:
@@ -178,14 +183,10 @@ def is_reached(structure: Structure, modes: Modes, set_up: SetUp) -> bool:
     bool
         False where the forces excite nothing of a motion, as in the other plane of a symmetric frame.
     """
-    inside = (modes.frequencies_hz >= set_up.band_hz[0]) & (modes.frequencies_hz <= set_up.band_hz[1])
-
-    def shapes_at(nodes: Iterable[int]) -> FloatArray:
-        return np.array([structure.row(Point(node, structure.direction)) for node in nodes]) @ modes.shapes[:, inside]
-
-    largest = np.abs(shapes_at(structure.nodes)).max(axis=0)
-    motions = shapes_at((*(sensor.node for sensor in set_up.sensors), *set_up.points)) / largest
-    forces = shapes_at(node for node, _ in set_up.excited_points) / largest
+    nodes = sorted(structure.nodes)
+    shapes = _relative_motions(structure, modes, set_up.band_hz)
+    motions = shapes[[nodes.index(node) for node in (*(sensor.node for sensor in set_up.sensors), *set_up.points)]]
+    forces = shapes[[nodes.index(node) for node, _ in set_up.excited_points]]
     reaches = np.abs(motions[:, None] * forces).max(axis=2) > LEAST_REACH
     return bool(reaches.any(axis=1).all() and reaches.any(axis=0).all())
 

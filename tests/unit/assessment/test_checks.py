@@ -134,6 +134,17 @@ def test_what_no_controller_feels_is_not_held_against_the_band(evidence, factor,
     assert ("nothing to a controller" in check.says) == (verdict is USABLE)
 
 
+def test_an_frf_that_is_nothing_but_noise_is_not_held_against_the_model(evidence):
+    """As of a force that moves no sensor: a third of its lines stand above their standard deviation."""
+    variance = np.broadcast_to(evidence.frfs.variance, evidence.frfs.values.shape).copy()
+    noise = np.random.default_rng(3).normal(size=(len(variance), 2)) @ [1, 1j] / np.sqrt(2)
+    values = evidence.frfs.values.copy()
+    values[:, 0] = noise * np.sqrt(variance[:, 0])
+    check = the(agreement.amplitude, replace(evidence, frfs=replace(evidence.frfs, values=values, variance=variance)))
+    assert check.verdict is USABLE
+    assert check.where != str(evidence.frfs.labels[0])
+
+
 def without_counterpart(evidence, kind, count):
     """The run with the first rows of a kind missing in the model."""
     rows, left = [], count

@@ -90,9 +90,7 @@ def evaluate_receptances(
     shapes = basis.project_motions(motions) @ base.modes.vectors
     from_outputs, from_inputs = np.matmul(shapes, base.output_motion), np.matmul(shapes, base.input_motion)
     across = from_outputs[:, :, layout.output_index] * from_inputs[:, :, layout.input_index] * base.chain[:, None, :]
-    s, modes = base.s[:, None], base.modes
-    damping = 2 * modes.ratio * np.sqrt(np.abs(modes.squares))
-    at_motions = (1 / (s**2 + s * damping + modes.squares)) @ (shapes**2).T + missing_flexibility
+    at_motions = _modal_receptances(base) @ (shapes**2).T + missing_flexibility
     if base.attached_motion.shape[2]:
         at_attachments = np.matmul(shapes, base.attached_motion)
         at_motions = at_motions - np.einsum("kpa,kab,kpb->kp", at_attachments, base.attached_stiffness, at_attachments)
@@ -127,10 +125,8 @@ def evaluate_on_axes(
         alone = evaluate_receptances(base, basis, layout, motions, missing)
         return Receptances(across=alone.across[..., None], at_motions=alone.at_motions[..., None])
     shapes = (basis.project_motions(motions) @ base.modes.vectors).reshape(len(locations), n_axes, -1)
-    s, modes = base.s[:, None], base.modes
-    inverse = 1 / (s**2 + s * 2 * modes.ratio * np.sqrt(np.abs(modes.squares)) + modes.squares)
     between = (shapes[:, :, None] * shapes[:, None]).reshape(-1, shapes.shape[2])
-    at_motions = (inverse @ between.T).reshape(len(s), len(locations), n_axes, n_axes)
+    at_motions = (_modal_receptances(base) @ between.T).reshape(-1, len(locations), n_axes, n_axes)
     at_motions += missing.reshape(-1, n_axes, 1) * np.eye(n_axes)
     if base.attached_motion.shape[2]:
         at_attachments = shapes @ base.attached_motion[:, None]
@@ -140,6 +136,12 @@ def evaluate_on_axes(
     from_inputs = np.linalg.solve(axes, shapes @ base.input_motion[:, None])
     across = from_outputs[..., layout.output_index] * from_inputs[..., layout.input_index]
     return Receptances(across=np.moveaxis(across * base.chain[:, None, None], 3, 1), at_motions=np.asarray(along_axes))
+
+
+def _modal_receptances(base: Response) -> ComplexArray:
+    """Receptance of each mode by itself, (n_points, q)."""
+    s, modes = base.s[:, None], base.modes
+    return np.asarray(1 / (s**2 + s * 2 * modes.ratio * np.sqrt(np.abs(modes.squares)) + modes.squares))
 
 
 def compute_missing_flexibility(basis: Basis, motions: Sequence[Motion]) -> FloatArray:

@@ -12,7 +12,7 @@ from frf_ipz.diagnosis.evidence.fit import Fit
 from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, compute_weights
 from frf_ipz.diagnosis.evidence.map_fit import fit_map
 from frf_ipz.diagnosis.search.global_scan import find_best_start, list_components
-from frf_ipz.diagnosis.search.rivals import is_hopeless
+from frf_ipz.diagnosis.search.rivals import MAX_BEHIND_COMPLETE, is_hopeless
 from frf_ipz.diagnosis.search.robust_refinement import COST_RATIO, GAIN, MAX_STEPS, REFINED_ERROR, refine
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ Fits: TypeAlias = "dict[ComponentKey, Fit]"
 
 N_EFFECTS = 6  # effects whose neighbourhoods are searched
 MAX_BEHIND = 2000.0  # log Bayes factor behind the best: an effect that is further behind is not searched any more
-MAX_BEHIND_COMPLETE = 300.0  # the same behind one that explains nearly all
 COMPLETE_COST_RATIO = 2.0  # times the cost of one that explains nearly all: a fit on its way may have reached that much
 MAX_STARTS = 64  # start values of an imitator
 N_GLANCED, N_FITTED_AROUND = 24, 4  # locations further around that are compared by one step, and fitted

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.hypothesis import Hypothesis
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
 
-HOPELESS = 300.0  # log-likelihood behind one that explains nearly all: a rival that is further behind is not fitted
+MAX_BEHIND_COMPLETE = 300.0  # log Bayes factor behind one that explains nearly all: further behind, no rival is fitted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,7 +64,7 @@ class RivalTest:
         points = [problem.evaluate(hypothesis.clip_to_searched(values)) for values in starts]
         best = min(points, key=problem.cost)
         least = problem.cost(best)
-        enough = self.own_cost + HOPELESS
+        enough = self.own_cost + MAX_BEHIND_COMPLETE
 
         def is_enough(step: AcceptedStep[_RivalPoint]) -> bool:
             return problem.cost(step.after) < enough
@@ -115,7 +115,7 @@ def is_hopeless(problem: InferenceProblem, fit: Fit, hypothesis: Hypothesis, sta
     bool
         False where the fit does not explain nearly all: there a rival may be what is true.
     """
-    return fit.explains_nearly_all and make_rival_test(problem, fit).deficit(hypothesis, starts) > HOPELESS
+    return fit.explains_nearly_all and make_rival_test(problem, fit).deficit(hypothesis, starts) > MAX_BEHIND_COMPLETE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

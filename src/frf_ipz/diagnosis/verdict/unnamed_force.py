@@ -20,7 +20,8 @@ from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import Attachment, Change
 from frf_ipz.diagnosis.search.component_search import rank_fits
 from frf_ipz.diagnosis.search.global_scan import scan_globally
-from frf_ipz.diagnosis.search.neighbourhood_search import MAX_BEHIND_COMPLETE, search_neighbourhoods
+from frf_ipz.diagnosis.search.neighbourhood_search import search_neighbourhoods
+from frf_ipz.diagnosis.search.rivals import MAX_BEHIND_COMPLETE
 from frf_ipz.diagnosis.search.robust_refinement import refine_halfway, refine_starts
 from frf_ipz.diagnosis.verdict.goodness import required_beside
 

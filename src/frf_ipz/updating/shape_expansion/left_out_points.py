@@ -147,8 +147,8 @@ def _lines(fit: ModalFit) -> ComplexArray:
 def _heard(fit: ModalFit, s: ComplexArray) -> ComplexArray:
     """Fitted FRFs; NaN where they do not stand above the noise that is left in them."""
     values = fit.model(s)
-    nearest = np.abs(fit.frequency_hz[:, None] - s.imag / (2 * np.pi)).argmin(axis=0)
-    return np.where(above_noise(np.abs(values), fit.value_std[nearest]), values, np.nan)
+    lines = np.clip(np.searchsorted(fit.frequency_hz, s.imag / (2 * np.pi)), 0, len(fit.frequency_hz) - 1)
+    return np.where(above_noise(np.abs(values), fit.value_std[lines]), values, np.nan)
 
 
 def median_error_db(measured: ComplexArray, predicted: ComplexArray, *, is_level_known: bool) -> float:

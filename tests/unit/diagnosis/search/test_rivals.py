@@ -11,7 +11,7 @@ from frf_ipz.diagnosis.evidence.hypothesis import Component
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.search import neighbourhood_search
 from frf_ipz.diagnosis.search.component_search import fit_null_model, search_component
-from frf_ipz.diagnosis.search.rivals import HOPELESS, is_hopeless, make_rival_test
+from frf_ipz.diagnosis.search.rivals import MAX_BEHIND_COMPLETE, is_hopeless, make_rival_test
 from frf_ipz.fe.changes import with_point_masses
 
 NODE, MASS_KG = 12, 0.02
@@ -39,7 +39,7 @@ def fit(problem):
 
 def test_a_fit_is_no_worse_than_itself(problem, fit):
     deficit = make_rival_test(problem, fit).deficit(fit.hypothesis, [factor * fit.values for factor in FROM])
-    assert deficit < HOPELESS
+    assert deficit < MAX_BEHIND_COMPLETE
     assert make_rival_test(problem, fit).deficit(fit.hypothesis, [fit.values]) == pytest.approx(0.0, abs=NOTHING)
 
 
