@@ -40,6 +40,7 @@ CHECKS: tuple[Ask, ...] = (
     prediction.band_width,
     quality.parameters,
     quality.fit,
+    quality.impacts,
     quality.scale,
     quality.diagnosis,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,9 +10,12 @@ import numpy as np
 
 from frf_ipz.assessment.deviations import measured_deviation, point_deviation
 from frf_ipz.assessment.measured_points import MeasuredPoints
+from frf_ipz.ingest.estimation.record_table import empty_record_table
 from frf_ipz.prediction.predict import band_of_magnitudes
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from frf_ipz.arrays import FloatArray
     from frf_ipz.assessment.deviations import FrfDeviation
     from frf_ipz.diagnosis.result import Diagnosis
@@ -53,6 +56,8 @@ class Evidence(MeasuredPoints):
         What the diagnosis found is in the model that predicts.
     impacts : tuple of Trace
         Forces and responses of a hammer's impacts; empty for other tests.
+    records : DataFrame
+        Impacts and records, as `FrfEstimate` has them; empty where FRFs were estimated elsewhere.
     is_recorded : bool
         The FRFs were estimated from columns of recordings.
     test_file, model_file : str
@@ -68,6 +73,7 @@ class Evidence(MeasuredPoints):
     explained_model: StructuralModel | None = None
     is_corrected: bool = False
     impacts: tuple[Trace, ...] = ()
+    records: pd.DataFrame = field(default_factory=empty_record_table)
     is_recorded: bool = False
     test_file: str = "test.toml"
     model_file: str = "model.toml"

@@ -47,6 +47,7 @@ RECORD = (
     Column("step_s", "float", "s", "time step of the file"),
     Column("samples", "int", "1", "number of samples"),
     Column("trigger_s", "float", "s", "time from its start at which the force sets in"),
+    Column("unlike_others", "flag", "", "all its responses contradict the other impacts, and no fault explains it"),
 )
 FREQUENCY = Column("frequency_hz", "float", "Hz", "frequency line")
 LABEL = (

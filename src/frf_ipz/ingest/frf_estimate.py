@@ -55,7 +55,8 @@ class FrfEstimate(Tabulated, Drawn):
         (bool), ``weight``, ``marks`` (what is wrong, joined by "; "), and what was measured to say so:
         ``second_pulse_ratio`` (height over the first), ``remaining_amplitude`` (share of its amplitude that the slowest
         mode still has at the end) and ``slowest_mode_hz``, ``snr_db``, ``force_noise_N``, ``force_band_hz`` (up to
-        where the force's spectrum stays within 20 dB of its largest value), ``step_s``, ``samples``, ``trigger_s``.
+        where the force's spectrum stays within 20 dB of its largest value), ``step_s``, ``samples``, ``trigger_s``,
+        ``unlike_others`` (bool: all responses contradict those of the other impacts, and no fault explains it).
         Empty for FRFs that were estimated elsewhere.
     traces : tuple of Trace
         Forces and responses to draw.

@@ -98,7 +98,7 @@ def chain(
             outputs.assess(
                 runner,
                 frfs,
-                recordings.traces,
+                recordings,
                 fit,
                 model,
                 pairs,

@@ -336,3 +336,29 @@ def test_the_worst_check_stands_first():
     assert found.verdict is NOT_USABLE
     cause = frf_ipz.LikelyCause(says="it is in g", file="test.toml", line_or_key="unit", probability=0.9)
     assert frf_ipz.Assessment.of_checks(checks[:1], cause).verdict is WITH_CARE
+
+
+@pytest.mark.parametrize(
+    ("number", "is_unlike", "called"),
+    [
+        (2, True, "the hardest impact at 12:+z, hit_2 (150 N)"),
+        (1, True, "the softest impact"),
+        (0, True, ""),
+        (2, False, ""),
+    ],
+)
+def test_an_impact_at_another_level_that_contradicts_the_others_takes_care(evidence, number, is_unlike, called):
+    peaks, there = np.array([100.0, -60.0, 150.0, 80.0]), np.arange(4) == number
+    records = pd.DataFrame(
+        {
+            "record": [f"hit_{place}" for place in range(4)],
+            "input_dof": "12:+z",
+            "peak_force_N": peaks,
+            "used": ~there,
+            "unlike_others": there & is_unlike,
+        }
+    )
+    checks = list(quality.impacts(replace(evidence, records=records)))
+    assert [check.verdict for check in checks] == ([WITH_CARE] if called else [])
+    assert all(check.says.startswith(called) for check in checks)
+    assert not list(quality.impacts(evidence))

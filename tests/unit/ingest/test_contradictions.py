@@ -7,7 +7,7 @@ import frf_ipz
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from synthetic_campaign import HIT, Structure, impact, write_csv, write_test
+from synthetic_campaign import HIT, Structure, impact, respond, write_csv, write_test
 
 STEP_S = 1 / 2048
 NOISE = 0.02
@@ -330,3 +330,21 @@ def test_lines_where_late_records_lack_most_of_the_force_are_not_used():
     assert 250 < last < 1000
     assert not is_known[frfs.frequency_hz > last].any()
     assert is_known[frfs.in_band((1.0, last))].all()
+
+
+def knock(signals):
+    """The machine itself moves otherwise: its modes are 4 % higher."""
+    step = Structure()
+    other = Structure(frequency_hz=tuple(1.04 * hertz for hertz in step.frequency_hz))
+    noise = NOISE * np.random.default_rng(7).standard_normal(signals[1:].shape)
+    signals[1:] = respond(other, signals[0], STEP_S) + noise
+    return signals
+
+
+@pytest.mark.parametrize(
+    ("change", "is_unlike"), [(knock, True), (reverse_all, False), (exchange, False), (lose_samples, False)]
+)
+def test_only_an_impact_that_no_fault_explains_is_unlike_the_others(tmp_path, change, is_unlike):
+    records = estimate(tmp_path, change, exponential_window_s=0.2).records
+    assert list(records.used) == [number != 2 for number in range(5)]
+    assert list(records.unlike_others) == [is_unlike and number == 2 for number in range(5)]

@@ -52,6 +52,45 @@ def fit(evidence: Evidence) -> Iterator[Check]:
     )
 
 
+def impacts(evidence: Evidence) -> Iterator[Check]:
+    """Ask whether impacts that contradict the others are the hardest or the softest ones.
+
+    An impact is left out where it contradicts the others. Where all of its responses do, and no fault of a recording
+    explains it, the structure itself may have moved otherwise: a gap that closes, friction that holds.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where there are such impacts.
+    """
+    records = evidence.records
+    unlike = records[records["unlike_others"].astype(bool) & ~records["used"].astype(bool)]
+    for input_dof in unlike["input_dof"].unique():
+        peaks = records.loc[records["input_dof"] == input_dof, "peak_force_N"].abs()
+        at_point = unlike[unlike["input_dof"] == input_dof]
+        ends = {peaks.idxmax(): "hardest", peaks.idxmin(): "softest"}
+        extreme = next((row for row in at_point.index if row in ends), None)
+        if extreme is None:
+            continue
+        record = records.loc[extreme]
+        yield Check(
+            name="impacts left out",
+            verdict=Verdict.WITH_CARE,
+            figure=float(peaks[extreme]),
+            unit="N",
+            where=str(input_dof),
+            says=f"the {ends[extreme]} impact at {input_dof}, {record['record']} ({peaks[extreme]:.3g} N), contradicts "
+            "the others in all responses, and no fault of the recording explains it: the machine may move otherwise at "
+            "that level",
+            advice="strike it as hard as it is driven in use, several times at each level, and compare the FRFs",
+        )
+
+
 def _misfit_db(evidence: Evidence) -> FloatArray:
     """Give what the misfit is of each FRF and band beside the FRF itself, dB: (n_rows,)."""
     powers, lines_hz = np.abs(evidence.measured) ** 2, evidence.frfs.frequency_hz[evidence.lines]

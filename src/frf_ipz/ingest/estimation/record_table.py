@@ -32,6 +32,7 @@ COLUMNS = (
     "step_s",
     "samples",
     "trigger_s",
+    "unlike_others",
 )
 
 
@@ -90,4 +91,5 @@ def _make_row(record: RecordInfo, weight: float) -> tuple[object, ...]:
         record.step_s,
         record.n_samples,
         record.trigger * record.step_s,
+        record.is_unlike,
     )

@@ -118,19 +118,25 @@ def _compare_setup(
     columns = [channel.column for channel in files.test.output_channels]
     comparisons = [_compare_output(files, survey, records, spectra, output) for output in range(len(columns))]
     causes = [_name_causes(columns, spectra, comparisons, impact) for impact in range(len(records))]
+    unlike: set[tuple[int, int]] = set()
     for impact, named in enumerate(causes):
         for output, comparison in enumerate(comparisons):
             if comparison is not None and named.get(output) == UNNAMED:
                 agreeing = [records[number] for number in comparison.agreeing]
                 lost = _find_lost(files, survey, agreeing, records[impact], output)
-                named[output] = f"{CONTRADICTS}: {_explain(survey, spectra, comparison, (impact, output), lost)}"
+                explained = _explain(survey, spectra, comparison, (impact, output), lost)
+                if not explained:
+                    unlike.add((impact, output))
+                named[output] = f"{CONTRADICTS}: {explained or _difference(spectra, comparison, (impact, output))}"
     scales = np.ones((len(records), len(columns)))
     for output, comparison in enumerate(comparisons):
         if comparison is not None:
             scales[:, output] = noise_scales(spectra, comparison, output)
     return [
         replace(
-            _with_causes(record, causes[impact], columns), noise_scales=tuple(float(scale) for scale in scales[impact])
+            _with_causes(record, causes[impact], columns),
+            noise_scales=tuple(float(scale) for scale in scales[impact]),
+            is_unlike=all((impact, output) in unlike for output in record.used_outputs),
         )
         for impact, record in enumerate(records)
     ]
@@ -245,7 +251,7 @@ def _explain(
     place: tuple[int, int],
     lost_samples: tuple[int, int, float],
 ) -> str:
-    """Say by what one response of an impact contradicts those of the others."""
+    """Say what fault makes one response of an impact contradict those of the others; empty where none does."""
     impact, output = place
     force, response, noise = spectra.force[impact], spectra.responses[impact, output], spectra.noise[impact, output]
     misfit = comparison.misfit(force, response, noise)
@@ -258,6 +264,13 @@ def _explain(
     factor = complex(np.sum(weight * expected.conj() * response) / np.sum(weight * np.abs(expected) ** 2))
     if abs(factor) and comparison.explains(misfit, comparison.misfit(force, response / factor, noise), 1):
         return f"it is {abs(factor):.3g} times as large"
+    return ""
+
+
+def _difference(spectra: ImpactSpectra, comparison: OutputComparison, place: tuple[int, int]) -> str:
+    """Say by how much one response of an impact differs from what those of the others make of its force."""
+    impact, output = place
+    response, expected = spectra.responses[impact, output], comparison.frf * spectra.force[impact]
     difference = np.abs(response - expected) / np.maximum(np.abs(expected), np.finfo(float).tiny)
     usual = np.sqrt(comparison.scatter) / np.maximum(np.abs(expected), np.finfo(float).tiny)
     return f"it is {100 * np.median(difference):.2g} % off (median), the others {100 * np.median(usual):.2g} %"

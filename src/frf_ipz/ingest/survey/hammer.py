@@ -74,7 +74,12 @@ def survey_hammer(files: RecordingFiles, options: IngestOptions, progress: Progr
 def _with_contradictions(record: RecordInfo, compared: RecordInfo) -> RecordInfo:
     """Add what the comparison with the other impacts has found."""
     faults = tuple(text for text in compared.faults if text.startswith(CONTRADICTS))
-    return replace(record, faults=(*record.faults, *faults), channel_faults=compared.channel_faults)
+    return replace(
+        record,
+        faults=(*record.faults, *faults),
+        channel_faults=compared.channel_faults,
+        is_unlike=compared.is_unlike,
+    )
 
 
 def _plan(indices: Sequence[FileIndex], records: Sequence[RecordInfo], options: IngestOptions) -> Survey:

@@ -72,6 +72,8 @@ class RecordInfo:
         Noise power of each response over that of the other impacts; empty where they cannot be compared.
     period : int
         Samples after which the force of a shaker comes again; 0 where it does not.
+    is_unlike : bool
+        All its responses contradict those of the other impacts, and no fault of a recording explains it.
     """
 
     name: str
@@ -104,6 +106,7 @@ class RecordInfo:
     lacks_most: bool = False
     noise_scales: tuple[float, ...] = ()
     period: int = 0
+    is_unlike: bool = False
 
     @property
     def n_samples(self) -> int:

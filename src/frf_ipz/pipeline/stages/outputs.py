@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from frf_ipz.export.options import ExportOptions
     from frf_ipz.export.state_space import StateSpaceModel
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.ingest.frf_estimate import Trace
+    from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.pipeline.stage_runner import StageRunner
     from frf_ipz.prediction.prediction import Prediction
@@ -86,7 +86,7 @@ def predict(runner: StageRunner, updated: UpdatedModel, modal_fit: ModalFit, frf
 def assess(
     runner: StageRunner,
     frfs: FrfSet,
-    traces: tuple[Trace, ...],
+    recordings: FrfEstimate,
     modal_fit: ModalFit,
     fe_model: StructuralModel,
     pairs: Pairs,
@@ -104,8 +104,8 @@ def assess(
         Inputs, folder and keys of the earlier stages.
     frfs : FrfSet
         The measured FRFs.
-    traces : tuple of Trace
-        Forces and responses of records.
+    recordings : FrfEstimate
+        What the FRFs were estimated from.
     modal_fit : ModalFit
         The fitted model.
     fe_model : StructuralModel
@@ -146,7 +146,8 @@ def assess(
                 with_causes=with_causes,
                 explained_model=_explained_model(runner, fe_model, diagnosis),
                 is_corrected=inputs.options.diagnose.apply,
-                impacts=traces if inputs.test.kind == "hammer" else (),
+                impacts=recordings.traces if inputs.test.kind == "hammer" else (),
+                records=recordings.records,
                 **places,
             )
         ),
