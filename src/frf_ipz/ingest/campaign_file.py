@@ -251,7 +251,7 @@ class ModesKeys:
     Parameters
     ----------
     file : str
-        Universal file with data sets 55; or CSV
+        Universal file with data sets 55 or 2414; or CSV
         ``mode,frequency_hz,damping_ratio[,frequency_std_hz,damping_ratio_std],dof,real,imag`` with one row a mode and
         DOF.
     input_dofs : tuple of str

@@ -4,9 +4,11 @@ import contextlib
 
 import numpy as np
 import pytest
+import pyuff
 
 import frf_ipz
 from frf_ipz.ingest.formats.modes_file import ModesSource
+from frf_ipz.ingest.formats.modes_uff import holds_shapes
 from frf_ipz.ingest.formats.registry import read_modes_file
 from stated_modes import TEST, as_csv, stated_modes
 
@@ -73,6 +75,47 @@ def test_universal_file_with_touching_columns(tmp_path):
     assert "-1" in text
     (tmp_path / "modes.unv").write_text(text.replace(" 0.00000E+00", "-0.00000E+00"))
     assert read(tmp_path / "modes.unv").dofs[0].name == "6:z"
+
+
+def results(path, modes, *, analysis):
+    """Data sets 2414 by pyuff: stresses on elements, which are no modes, then the modes."""
+    shapes = modes.shapes * np.array([dof.sign for dof in modes.dofs])[:, None]
+    common = {"type": 2414, "analysis_dataset_name": "", **{f"id{number}": "" for number in range(1, 6)}}
+    common |= {f"record10_field{number}": 0 for number in range(1, 9)} | {"model_type": 1}
+    stresses = {"analysis_type": 1, "data_characteristic": 4, "result_type": 2, "data_type": 2}
+    stresses |= {"number_of_data_values_for_the_data_component": 6, "dataset_location": 2, "analysis_dataset_label": 9}
+    sets = [stresses | {"element_nums": np.array([1]), "data_at_element": np.ones((1, 6))}]
+    for mode, (hertz, ratio) in enumerate(zip(modes.natural_frequency_hz, modes.damping_ratio, strict=True)):
+        pole = 2 * np.pi * hertz * complex(-ratio, (1 - ratio**2) ** 0.5) * (analysis == 3)
+        parts = np.stack([shapes[:, mode].real, shapes[:, mode].imag], 1)[:, : 1 if analysis == 2 else 2]
+        values = np.concatenate([0 * parts, 0 * parts, parts], 1)
+        entry = {"analysis_type": analysis, "data_characteristic": 2, "result_type": 8, "dataset_location": 1}
+        entry |= {"data_type": 2 if analysis == 2 else 5, "number_of_data_values_for_the_data_component": 3}
+        entry |= {"record12_field2": hertz, "record12_field5": ratio, "analysis_dataset_label": mode + 1}
+        entry |= {"record13_field1": pole.real, "record13_field2": pole.imag}
+        nodes = np.array([dof.node for dof in modes.dofs])
+        sets.append(entry | {"node_nums": nodes, "data_at_node": values})
+    pyuff.UFF(str(path)).write_sets([common | entry for entry in sets], "overwrite")
+
+
+@pytest.mark.parametrize("analysis", [2, 3])
+def test_results_of_a_computation(tmp_path, analysis):
+    modes = stated_modes(2)
+    results(tmp_path / "modes.unv", modes, analysis=analysis)
+    got = read(tmp_path / "modes.unv")
+    assert [dof.name for dof in got.dofs] == [dof.name for dof in modes.dofs]
+    np.testing.assert_allclose(got.natural_frequency_hz, modes.natural_frequency_hz, rtol=1e-5)
+    np.testing.assert_allclose(got.damping_ratio, modes.damping_ratio, rtol=1e-3)
+    signs = np.array([dof.sign for dof in modes.dofs])[:, None]
+    np.testing.assert_allclose(got.shapes, signs * modes.shapes, rtol=1e-5)
+    assert holds_shapes(tmp_path / "modes.unv")
+
+
+def test_results_that_are_no_modes(tmp_path):
+    results(tmp_path / "modes.unv", stated_modes(2), analysis=4)  # transient
+    assert not holds_shapes(tmp_path / "modes.unv")
+    with pytest.raises(frf_ipz.FileFormatError, match="holds no mode shape"):
+        read(tmp_path / "modes.unv")
 
 
 ROWS = as_csv(stated_modes(4)).splitlines()

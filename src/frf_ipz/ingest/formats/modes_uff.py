@@ -1,7 +1,8 @@
-"""Modes as universal files (UFF): data sets 55 of normal modes (analysis type 2) and complex modes (3 and 7), in text.
+"""Modes as universal files (UFF): normal modes (analysis type 2) and complex modes (3 and 7), in text.
 
-What the records hold: Universal File Datasets Summary, number 55, Structural Dynamics Research Laboratory, University
-of Cincinnati. DOFs that are 0 in every mode were not measured: nodes without a sensor in a direction hold a 0 there.
+Data sets 55 (data at nodes), and 2414 (analysis data), which has replaced it. What the records hold: Universal File
+Datasets Summary, Structural Dynamics Research Laboratory, University of Cincinnati. DOFs that are 0 in every mode were
+not measured: nodes without a sensor in a direction hold a 0 there.
 """
 
 from __future__ import annotations
@@ -30,13 +31,16 @@ NORMAL_MODE, COMPLEX_MODES = 2, (3, 7)  # the latter of displacements, or of vel
 REAL, COMPLEX = (2, 4), (5, 6)  # types of data, of single and of double precision
 PER_LINE = 6  # numbers
 LARGEST = 999_999_999  # integer of a field of ten columns
-N_NAMES = 5  # lines of text before the numbers
-ADVICE = "export the modes again, as data sets 55 with normal or complex modes"
+NAMES, RESULTS = "55", "2414"  # kinds of data sets
+N_LINES = {NAMES: 5, RESULTS: 8}  # before the types: texts; of results also a label, and where the data are
+AT_NODES = 1  # such data
+MOTIONS = {8, 11, 12}  # results that are displacements, velocities, accelerations
+ADVICE = "export the modes again, as data sets 55 or 2414 with normal or complex modes"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Shape:
-    """One data set 55."""
+    """One mode."""
 
     frequency_hz: float
     ratio: float
@@ -52,9 +56,9 @@ class _ModesUff:
 
     def read_modes(self, source: ModesSource) -> ModalParameters:
         lines = read_bytes(source.path).decode("latin-1").splitlines()
-        shapes = [_read_shape(source.path, lines, *ends) for ends in _data_sets(lines)]
+        shapes = [_read_shape(data) for data in _data_sets(source.path, lines)]
         if not shapes:
-            raise FileFormatError(source.path, f"holds no mode shape (data set 55); {ADVICE}")
+            raise FileFormatError(source.path, f"holds no mode shape (data set 55 or 2414); {ADVICE}")
         nodes = list(dict.fromkeys(node for shape in shapes for node in shape.values))
         width = max(len(value) for shape in shapes for value in shape.values.values())
         table = np.zeros((len(nodes), width, len(shapes)), complex)
@@ -88,26 +92,44 @@ def holds_shapes(path: Path) -> bool:
         True where it is.
     """
     data = read_bytes(path)
-    return is_universal(data[:4096]) and bool(_data_sets(data.decode("latin-1").splitlines()))
+    try:
+        return is_universal(data[:4096]) and bool(_data_sets(path, data.decode("latin-1").splitlines()))
+    except FileFormatError:  # said where the modes are read
+        return True
 
 
-def _data_sets(lines: list[str]) -> list[tuple[int, int]]:
-    """Find the data sets 55: first line after their number, and the line behind their last."""
+def _data_sets(path: Path, lines: list[str]) -> list[_DataSet]:
+    """Find the data sets 55, and those 2414 that are modes: other results of a computation stand beside them."""
     marks = [number for number, line in enumerate(lines) if line.strip() == END]
-    return [
-        (begin + 2, end)
+    sets = [
+        _DataSet(path=path, lines=lines, kind=lines[begin + 1].strip(), first=begin + 2, end=end)
         for begin, end in zip(marks[::2], [*marks[1::2], len(lines)], strict=False)
-        if begin + 1 < len(lines) and lines[begin + 1].strip() == "55"
+        if begin + 1 < len(lines) and lines[begin + 1].strip() in N_LINES
     ]
+    return [data for data in sets if data.kind == NAMES or data.is_mode]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _DataSet:
-    """Lines of one data set 55."""
+    """Lines of one data set 55 or 2414: the first behind its number, and the one behind its last."""
 
     path: Path
     lines: list[str]
+    kind: str
+    first: int
     end: int
+
+    @property
+    def types(self) -> int:
+        """Line of the types."""
+        return self.first + N_LINES[self.kind]
+
+    @property
+    def is_mode(self) -> bool:
+        """Results that are motions of nodes in modes; what is damaged is said where it is read."""
+        location = self.integers(self.first + 2, 10, 1, "where data are")[0]
+        _, analysis, _, result, *_ = self.integers(self.types, 10, 6, "the types of a data set 2414")
+        return location == AT_NODES and analysis in {NORMAL_MODE, *COMPLEX_MODES} and result in MOTIONS
 
     def numbers(self, line: int, width: int, count: int, what: str) -> list[float]:
         """Read numbers by the blanks between them, or by columns where they touch."""
@@ -133,32 +155,52 @@ class _DataSet:
         return FileFormatError(self.path, f"{problem}; {ADVICE}", where=f"line {min(line, self.end - 1) + 1}")
 
 
-def _read_shape(path: Path, lines: list[str], first: int, end: int) -> _Shape:
-    data = _DataSet(path=path, lines=lines, end=end)
-    at = first + N_NAMES
-    _, analysis, _, _, data_type, n_values = data.integers(at, 10, 6, "the types of a data set 55")
+def _read_shape(data: _DataSet) -> _Shape:
+    at = data.types
+    _, analysis, _, _, data_type, n_values = data.integers(at, 10, 6, f"the types of a data set {data.kind}")
     is_complex = data_type in COMPLEX
     if analysis not in (NORMAL_MODE, *COMPLEX_MODES) or not (is_complex or data_type in REAL):
         raise data.fault(f"the analysis of type {analysis} with data of type {data_type} is no mode that is read", at)
     if not 1 <= n_values <= len(DIRECTIONS):
         raise data.fault(f"{n_values} values a node; a node has 1 to 6", at)
-    n_real = data.integers(at + 1, 10, 2, "the counts of a data set 55")[1]
-    frequency_hz, ratio = _read_pole(data, at + 2, analysis, n_real)
     n_numbers = n_values * (2 if is_complex else 1)
-    motions = _read_motions(data, at + 3 + max(0, -(-n_real // PER_LINE) - 1), n_numbers)
+    if data.kind == RESULTS:
+        frequency_hz, ratio = _read_result_pole(data, at + 3, analysis)
+        motions = _read_motions(data, at + 5, n_numbers)
+    else:
+        n_real = data.integers(at + 1, 10, 2, "the counts of a data set 55")[1]
+        frequency_hz, ratio = _read_pole(data, at + 2, analysis, n_real)
+        motions = _read_motions(data, at + 3 + max(0, -(-n_real // PER_LINE) - 1), n_numbers)
     values = {node: row[::2] + 1j * row[1::2] if is_complex else row.astype(complex) for node, row in motions.items()}
     return _Shape(frequency_hz=frequency_hz, ratio=ratio, values=values)
 
 
 def _read_pole(data: _DataSet, line: int, analysis: int, n_real: int) -> tuple[float, float]:
-    """Read frequency and damping ratio; a loss factor is twice the viscous ratio that dissipates as much."""
+    """Read frequency and damping ratio of a data set 55."""
     values = data.numbers(line, 13, min(max(n_real, 2), 4), "the frequency of a mode")
     if analysis in COMPLEX_MODES:
-        pole = np.array(complex(values[0], abs(values[1])))
-        frequency_hz, ratio = float(natural_frequency_hz(pole)), float(damping_ratio(pole))
-    else:
-        viscous, hysteretic = (*values[2:4], 0.0, 0.0)[:2]
-        frequency_hz, ratio = values[0], viscous or hysteretic / 2
+        return _of_pole(data, line, complex(values[0], values[1]))
+    viscous, hysteretic = (*values[2:4], 0.0, 0.0)[:2]
+    return _checked(data, line, values[0], viscous, hysteretic)
+
+
+def _read_result_pole(data: _DataSet, line: int, analysis: int) -> tuple[float, float]:
+    """Read frequency and damping ratio of a data set 2414, whose eigenvalue programs may leave out."""
+    _, frequency_hz, _, _, viscous, hysteretic = data.numbers(line, 13, 6, "the frequency of a mode")[:6]
+    eigenvalue = complex(*data.numbers(line + 1, 13, 2, "the eigenvalue of a mode")[:2])
+    if analysis in COMPLEX_MODES and eigenvalue:
+        return _of_pole(data, line + 1, eigenvalue)
+    return _checked(data, line, frequency_hz, viscous, hysteretic)
+
+
+def _of_pole(data: _DataSet, line: int, value: complex) -> tuple[float, float]:
+    pole = np.array(complex(value.real, abs(value.imag)))
+    return _checked(data, line, float(natural_frequency_hz(pole)), float(damping_ratio(pole)), 0.0)
+
+
+def _checked(data: _DataSet, line: int, frequency_hz: float, viscous: float, hysteretic: float) -> tuple[float, float]:
+    """Give frequency and damping ratio; a loss factor is twice the viscous ratio that dissipates as much."""
+    ratio = viscous or hysteretic / 2
     if not ratio > 0:
         problem = f"the mode at {frequency_hz:g} Hz has no damping; a test needs it: state the modes in a CSV"
         raise FileFormatError(data.path, problem, where=f"line {line + 1}")

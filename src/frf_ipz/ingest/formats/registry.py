@@ -206,8 +206,8 @@ def read_modes_file(source: ModesSource) -> ModalParameters:
             return modes
     raise FileFormatError(
         source.path,
-        "is of no known format for modes; expected is a universal file with data sets 55, or a CSV with the columns "
-        "mode,frequency_hz,damping_ratio,dof,real,imag",
+        "is of no known format for modes; expected is a universal file with data sets 55 or 2414, or a CSV with the "
+        "columns mode,frequency_hz,damping_ratio,dof,real,imag",
     )
 
 
