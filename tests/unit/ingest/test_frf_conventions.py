@@ -50,7 +50,9 @@ def test_conjugated_frfs_are_named(tmp_path, power):
     expect(estimate(tmp_path, values, quantity=quantity), values)
     text = message(tmp_path, np.conj(values), quantity=quantity)
     assert re.search("these FRFs look conjugated.*conjugated = true", text)
-    expect(estimate(tmp_path, np.conj(values), quantity=quantity, keys="conjugated = true"), values)
+    read = estimate(tmp_path, np.conj(values), quantity=quantity, keys="conjugated = true")
+    expect(read, values)
+    assert read.warnings == ("frf.csv: its FRFs are conjugated, as 'conjugated' asks for",)
     assert "with 'conjugated' these FRFs look conjugated" in message(
         tmp_path, values, quantity=quantity, keys="conjugated = true"
     )

@@ -92,6 +92,19 @@ def test_decays_that_are_cut_off_get_the_window_they_need(tmp_path):
     assert any("is cut off" in warning for warning in truncated.warnings)
 
 
+def test_an_exponential_window_does_not_magnify_what_precedes_the_pulse(tmp_path):
+    rng = np.random.default_rng(2)
+    for number in range(3):
+        signals = impact(RINGING, height=100.0 + 20 * number, at_s=0.2)
+        signals[0] += 1e-6 * rng.standard_normal(signals.shape[1])
+        before = int(np.argmax(np.abs(signals[0]) > 1.0)) - 100
+        signals[1:, :before] += rng.standard_normal((len(signals) - 1, before))
+        write_csv(tmp_path / "hits" / f"p_{number}.csv", signals, 1 / 2048)
+    result = estimate(write_test(tmp_path, HIT))
+    assert result.frfs.window_decay_1_s > 0.0
+    assert errors(result, RINGING).max() < 1e-3  # what the window leaves of the slowest mode
+
+
 def test_lines_that_a_window_correlates_are_counted(tmp_path):
     result = estimate(hammer_campaign(tmp_path, structure=RINGING))
     decay = result.frfs.window_decay_1_s * 2.0

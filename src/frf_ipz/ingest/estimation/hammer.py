@@ -9,7 +9,7 @@ import numpy as np
 from frf_ipz.ingest.estimation.averaging import average_recordings
 from frf_ipz.ingest.estimation.impact_noise import empty_noise
 from frf_ipz.ingest.signals.decay import noise_power
-from frf_ipz.ingest.signals.windows import exponential_window, force_window
+from frf_ipz.ingest.signals.windows import impact_windows
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -63,8 +63,8 @@ def _add_noise(noise: ImpactNoise, info: RecordInfo, record: Record, survey: Sur
     """Add what is known of the noise of an impact; `force` is the modulus of its force's transform."""
     rows = list(record.outputs)
     frequency_hz = np.asarray(np.fft.rfftfreq(survey.n_samples, record.step_s))
-    decay = exponential_window(record.n_samples, record.step_s, survey.decay_1_s, record.trigger)
-    window = decay * force_window(record.n_samples, *record.force_interval)
+    rate = survey.decay_1_s * record.step_s
+    window, decay = impact_windows(record.n_samples, record.force_interval, rate, record.trigger)
     responses = [noise_power(response[record.trigger :], record.step_s, frequency_hz) for response in record.responses]
     scales = np.array(info.noise_scales)[rows, None] if info.noise_scales else np.ones((len(rows), 1))
     noise.response[rows] += np.array(responses) * np.sum(decay**2)

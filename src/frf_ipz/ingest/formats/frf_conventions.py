@@ -61,7 +61,10 @@ def read_frf_source(source: FrfSource) -> tuple[MeasuredFrf, ...]:
 
 def _as_stated(frf: MeasuredFrf) -> MeasuredFrf:
     frf = _reciprocal(frf) if frf.source.is_reciprocal else frf
-    return replace(frf, values=np.conj(frf.values)) if frf.source.is_conjugated else frf
+    if not frf.source.is_conjugated:
+        return frf
+    note = f"{frf.source.path.name}: its FRFs are conjugated, as 'conjugated' asks for"
+    return replace(frf, values=np.conj(frf.values), notes=(*frf.notes, note))
 
 
 def _reciprocal(frf: MeasuredFrf) -> MeasuredFrf:

@@ -83,6 +83,42 @@ def exponential_window(n_samples: int, step_s: float, decay_1_s: float, origin: 
     return np.asarray(np.exp(-decay_1_s * step_s * (np.arange(n_samples) - origin)))
 
 
+def impact_windows(
+    n_samples: int, force_interval: tuple[int, int], decay: float, trigger: int
+) -> tuple[FloatArray, FloatArray]:
+    """Make the windows of an impact: one of its force, one of its responses.
+
+    What precedes the pulse is noise, and what moves still from before. An exponential window would magnify both, the
+    more the further they are from the pulse, so it begins with the force window.
+
+    Parameters
+    ----------
+    n_samples : int
+        Length of the record.
+    force_interval : pair of int
+        First sample of the force that is kept, and the one after the last.
+    decay : float
+        Rate of the exponential window times the time step; 0 for none.
+    trigger : int
+        Sample at which the exponential window is 1.
+
+    Returns
+    -------
+    pair of (n_samples,) array
+        Of the force, of the responses.
+
+    Examples
+    --------
+    >>> force, responses = impact_windows(40, (12, 20), 0.1, 12)
+    >>> bool((responses[:7] == 0.0).all()), bool(np.isclose(responses[8], np.exp(0.4), rtol=1e-12, atol=0.0))
+    (True, True)
+    """
+    of_force, of_responses = force_window(n_samples, *force_interval), np.ones(n_samples)
+    if decay:
+        of_responses = exponential_window(n_samples, 1.0, decay, trigger) * (np.cumsum(of_force) > 0.0)
+    return of_force * of_responses, of_responses
+
+
 def window_impact(
     signals: FloatArray, n_samples: int, force_interval: tuple[int, int], decay: float, trigger: int
 ) -> FloatArray:
@@ -106,11 +142,11 @@ def window_impact(
     (1 + n_outputs, n_samples) array
         The force first.
     """
+    of_force, of_responses = impact_windows(n_samples, force_interval, decay, trigger)
     windowed = np.zeros((len(signals), n_samples))
     windowed[:, : signals.shape[1]] = signals
-    windowed[0] *= force_window(n_samples, *force_interval)
-    if decay:
-        windowed *= exponential_window(n_samples, 1.0, decay, trigger)
+    windowed[0] *= of_force
+    windowed[1:] *= of_responses
     return windowed
 
 
