@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import BoolArray, FloatArray
 from frf_ipz.dofs import AnyDof, Dof
 
 MOST_NAMED = 4
@@ -148,14 +148,35 @@ class ShapeExpansion:
 
     def _points_apart(self) -> list[str]:
         """Name the points whose amplitudes disagree with what all others imply."""
-        if not self.is_level_known or len(self.points) < FEWEST:
+        if not self.is_level_known:
             return []
-        logs = np.log(self.ratio) - np.median(np.log(self.ratio))
-        scatter = NORMAL * float(np.median(np.abs(logs)))
-        apart = np.flatnonzero(np.abs(logs) > np.maximum(APART * scatter, LEAST))
+        logs, scatter, is_apart = points_apart(np.log(self.ratio))
         return [
             f"what was measured at {self.points[place]} is {100 * abs(np.expm1(logs[place])):.0f} % "
             f"{'low' if logs[place] < 0 else 'high'} in all its modes against what the other points imply, which "
             f"scatter by {100 * scatter:.1g} %: look at the gain of that file"
-            for place in apart.tolist()
+            for place in np.flatnonzero(is_apart).tolist()
         ]
+
+
+def points_apart(log_ratio: FloatArray) -> tuple[FloatArray, float, BoolArray]:
+    """Find the points whose amplitudes disagree with what all others imply.
+
+    Parameters
+    ----------
+    log_ratio : (n_points,) array
+        Logarithm of measured over predicted amplitude.
+
+    Returns
+    -------
+    deviation : (n_points,) array
+        From the median.
+    scatter : float
+        Standard deviation, by the median deviation.
+    is_apart : (n_points,) bool array
+        Those that stand out; none where the points are too few to tell.
+    """
+    deviation = log_ratio - np.median(log_ratio)
+    scatter = NORMAL * float(np.median(np.abs(deviation)))
+    is_apart = np.abs(deviation) > max(APART * scatter, LEAST)
+    return deviation, scatter, is_apart & (len(log_ratio) >= FEWEST)

@@ -17,9 +17,8 @@ from frf_ipz.dofs import AnyDof, Dof
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from frf_ipz.arrays import FloatArray
+    from frf_ipz.arrays import BoolArray, FloatArray
     from frf_ipz.structure import Geometry
-    from frf_ipz.updating.shape_expansion.left_out_points import LeftOutPoints
 
 ROUNDING = 1e-6  # of the extent of the measured points: printed coordinates
 
@@ -57,14 +56,14 @@ def lies_between(place: FloatArray, others: FloatArray) -> bool:
 
 
 def inner_points(
-    left_out: LeftOutPoints, measured: tuple[AnyDof, ...], dofs: Iterable[AnyDof], geometry: Geometry | None
-) -> tuple[tuple[int, ...], float]:
-    """Find the nodes between measured points, and by how much less errors of shapes exceed what is stated there.
+    left_out: tuple[AnyDof, ...], measured: tuple[AnyDof, ...], dofs: Iterable[AnyDof], geometry: Geometry | None
+) -> tuple[tuple[int, ...], BoolArray]:
+    """Find the nodes between measured points, and the left-out points that lie between others.
 
     Parameters
     ----------
-    left_out : LeftOutPoints
-        How well measured points follow from the others.
+    left_out : tuple of Dof or PortDof
+        Points that were left out.
     measured : tuple of Dof or PortDof
         All measured points of that side.
     dofs : iterable of Dof or PortDof
@@ -76,25 +75,26 @@ def inner_points(
     -------
     nodes : tuple of int
         Nodes in the hull of the measured points; none where their places, or errors between them, are not known.
-    share : float
-        Largest calibration of an inner left-out point over the largest of all.
+    is_inner : (n_left_out,) bool array
+        Left-out points in the hull of the others; none where there are no such nodes.
     """
     nowhere: tuple[int, ...] = ()
+    none = np.zeros(len(left_out), bool)
     if geometry is None or geometry.is_schematic or not all(isinstance(dof, Dof) for dof in measured):
-        return nowhere, 1.0
+        return nowhere, none
     numbers = np.asarray(geometry.nodes).tolist()
     place_of = dict(zip(numbers, np.asarray(geometry.coordinates_m, float), strict=True))
     nodes = {dof.node for dof in measured if isinstance(dof, Dof)}
     if not nodes <= place_of.keys():
-        return nowhere, 1.0
+        return nowhere, none
     is_inner = [
         isinstance(point, Dof)
         and lies_between(place_of[point.node], np.array([place_of[node] for node in nodes - {point.node}]))
-        for point in left_out.points
+        for point in left_out
     ]
     if not any(is_inner):
-        return nowhere, 1.0
+        return nowhere, none
     places = np.array([place_of[node] for node in sorted(nodes)])
     candidates = sorted({dof.node for dof in dofs if isinstance(dof, Dof)} & place_of.keys())
     inner = tuple(node for node in candidates if lies_between(place_of[node], places))
-    return inner, float(left_out.calibration[is_inner].max() / left_out.calibration.max())
+    return inner, np.array(is_inner, bool)

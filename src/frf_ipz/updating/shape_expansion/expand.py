@@ -16,7 +16,7 @@ from frf_ipz.control_margins import GAIN_MARGIN_DB, HALF, SIXTH
 from frf_ipz.late_imports import import_late
 from frf_ipz.pairing.pairs import Pair, Pairs, PairVerdict
 from frf_ipz.rational import natural_frequency_hz
-from frf_ipz.updating.expansion import ShapeExpansion
+from frf_ipz.updating.expansion import ShapeExpansion, points_apart
 from frf_ipz.updating.scale import fit_scale
 from frf_ipz.updating.shape_expansion.attached_masses import attachment_places, find_attached_masses
 from frf_ipz.updating.shape_expansion.between_points import inner_points
@@ -24,19 +24,25 @@ from frf_ipz.updating.shape_expansion.expanded_model import ExpandedModes, build
 from frf_ipz.updating.shape_expansion.left_out_points import (
     FEWEST,
     LeftOutPoints,
+    calibrate,
     errors_at_points,
     leave_points_out,
-    side_with_more,
 )
-from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes
+from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes, side_with_more
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import pandas as pd
 
+    from frf_ipz.arrays import BoolArray
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.identification.modal_fit import ModalFit
-    from frf_ipz.structure import Geometry
+    from frf_ipz.structure import Geometry, ReducedModel
     from frf_ipz.updating.options import UpdateOptions
     from frf_ipz.updating.problem import UpdateProblem
+    from frf_ipz.updating.shape_expansion.attached_masses import LoadedModel
+    from frf_ipz.updating.shape_expansion.measured_shapes import MeasuredShapes
     from frf_ipz.updating.updated_model import UpdatedModel
 else:
     pd = import_late("pandas")
@@ -81,21 +87,23 @@ def with_expanded_shapes(
     own_db = float(np.median(own[np.isfinite(own)])) if np.isfinite(own).any() else 0.0
     if own_db <= SIXTH * GAIN_MARGIN_DB:
         return updated
+    is_known = fit.unknown_scale == "none"
     places = attachment_places(problem.model, measured, geometry)
-    causes = [find_attached_masses(problem.model, measured, tried) for tried in dict.fromkeys(((), places))]
-    left_out_of = [leave_points_out(fit, loaded.model, error=loaded.error) for loaded in causes]
-    errors = [np.inf if left_out is None else float(np.median(left_out.error_db)) for left_out in left_out_of]
-    best = int(np.argmin(errors))
-    loaded, left_out = causes[best], left_out_of[best]
-    if left_out is None or errors[best] >= own_db:
+    loaded, left_out = _best_cause(fit, problem.model, measured, places, {})
+    doubts = _find_doubts(fit, loaded, left_out) if left_out is not None and is_known else {}
+    if doubts:
+        measured = measured_shapes(fit, doubts=doubts) or measured
+        loaded, left_out = _best_cause(fit, problem.model, measured, places, doubts)
+    if left_out is None or np.median(left_out.error_db) >= own_db:
         return updated
-    modes = expand_modes(loaded.model, measured, error=loaded.error, is_scale_known=fit.unknown_scale == "none")
-    if fit.unknown_scale == "none" and abs(20 * np.log10(modes.gain)) > HALF * GAIN_MARGIN_DB:
+    modes = expand_modes(loaded.model, measured, error=loaded.error, is_scale_known=is_known)
+    if is_known and abs(20 * np.log10(modes.gain)) > HALF * GAIN_MARGIN_DB:
         return updated  # a scale that is so far off where it is known is a mistake, which must show
+    inner_nodes, is_inner = inner_points(left_out.points, side_with_more(fit), loaded.model.expanded_dofs, geometry)
+    inner, anywhere = _calibrations(left_out, is_inner)
     model, ensemble = build_expanded_model(
-        loaded.model, modes, count=options.ensemble, calibration=float(left_out.calibration.max()), seed=options.seed
+        loaded.model, modes, count=options.ensemble, calibration=anywhere, seed=options.seed
     )
-    inner_nodes, inner_spread = inner_points(left_out, side_with_more(fit), loaded.model.expanded_dofs, geometry)
     expansion = ShapeExpansion(
         points=tuple(point.name for point in left_out.points),
         ratio=np.exp(left_out.log_ratio),
@@ -104,10 +112,10 @@ def with_expanded_shapes(
         stiffness_ratio=loaded.stiffness_ratio,
         masses=loaded.masses,
         split=_split_modes(modes),
-        is_level_known=fit.unknown_scale == "none",
+        is_level_known=is_known,
         inner_nodes=inner_nodes,
-        inner_spread=inner_spread,
-        reciprocal_spread=_reciprocal_spread(left_out),
+        inner_spread=inner / anywhere,
+        reciprocal_spread=calibrate(left_out.reciprocal) / anywhere if left_out.reciprocal else 1.0,
     )
     return replace(
         updated,
@@ -121,10 +129,57 @@ def with_expanded_shapes(
     )
 
 
-def _reciprocal_spread(left_out: LeftOutPoints) -> float:
-    """Tell by how much errors exceed what is stated where the other side has the point, over those at any other."""
-    seen = left_out.reciprocal[np.isfinite(left_out.reciprocal)]
-    return float(seen.max() / left_out.calibration.max()) if seen.size else 1.0
+def _best_cause(
+    fit: ModalFit,
+    model: ReducedModel,
+    measured: MeasuredShapes,
+    places: tuple[AnyDof, ...],
+    doubts: Mapping[AnyDof, float],
+) -> tuple[LoadedModel, LeftOutPoints | None]:
+    """Take the model as it is or with attached masses: where left-out points follow better from the others."""
+    causes = [find_attached_masses(model, measured, tried) for tried in dict.fromkeys(((), places))]
+    left_out_of = [leave_points_out(fit, loaded.model, error=loaded.error, doubts=doubts) for loaded in causes]
+    errors = [np.inf if left_out is None else float(np.median(left_out.error_db)) for left_out in left_out_of]
+    best = int(np.argmin(errors))
+    return causes[best], left_out_of[best]
+
+
+def _find_doubts(fit: ModalFit, loaded: LoadedModel, left_out: LeftOutPoints) -> dict[AnyDof, float]:
+    """Relative errors of points that all others contradict: what they are off by, so that they hardly count.
+
+    A wrong point spoils what is predicted at its neighbours. So the one that is off most is doubted first, and stays so
+    where it stands apart from what the others then are off by.
+    """
+    doubts: dict[AnyDof, float] = {}
+    judged: LeftOutPoints | None = left_out
+    while judged is not None:
+        sizes = np.abs(points_apart(judged.log_ratio)[0])
+        places = [place for place, point in enumerate(judged.points) if point not in doubts]
+        if not places:
+            break
+        worst = max(places, key=sizes.__getitem__)
+        tried = {**doubts, judged.points[worst]: float(sizes[worst])}
+        judged = leave_points_out(fit, loaded.model, error=loaded.error, doubts=tried)
+        if judged is None or not points_apart(judged.log_ratio)[2][worst]:
+            break
+        doubts = tried
+    return doubts
+
+
+def _calibrations(left_out: LeftOutPoints, is_inner: BoolArray) -> tuple[float, float]:
+    """Factors on standard deviations between measured points, and anywhere.
+
+    Points that reciprocity tells speak for no others, unless there are only such. Where it is not known which points
+    lie between others, the worst one speaks for all.
+    """
+    counts = ~left_out.is_told if not left_out.is_told.all() else np.ones(len(is_inner), bool)
+    inner = [errors for errors, use in zip(left_out.errors, counts & is_inner, strict=True) if use]
+    outer = [errors for errors, use in zip(left_out.errors, counts & ~is_inner, strict=True) if use]
+    if not inner:
+        worst = max(calibrate([errors]) for errors in outer)
+        return worst, worst
+    between = calibrate(inner)
+    return between, max(between, calibrate(outer)) if outer else between
 
 
 def _split_modes(modes: ExpandedModes) -> tuple[tuple[float, ...], ...]:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import brentq
 
 from frf_ipz.arrays import BoolArray, FloatArray
 from frf_ipz.numerics.noise_floor import above_noise
 from frf_ipz.pairing.poles import measured_amplitudes
 from frf_ipz.updating.shape_expansion.expanded_model import expand_modes, receptance
-from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes
+from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes, side_with_more
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from frf_ipz.arrays import ComplexArray
     from frf_ipz.dofs import AnyDof
     from frf_ipz.identification.modal_fit import ModalFit
@@ -24,6 +28,53 @@ LINES = 300  # of the band, at equal ratios
 FEWEST = 3  # points of a side: of two, one alone would tell the other's shape
 MOST = 12  # points left out, evenly over the side
 COVERED, COVERED_SQUARE = 0.9, 2.7055  # share of the modes that a band is to hold; that quantile of a normal square
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShapeErrors:
+    """Errors of expanded shapes at a left-out point, one a mode.
+
+    Parameters
+    ----------
+    difference : (n_modes,) array
+        Measured minus expanded amplitudes.
+    variance : (n_modes,) array
+        That the expansion states.
+    own_variance : (n_modes,) array
+        Of what was measured there, by the gain and place of its transducer.
+    """
+
+    difference: FloatArray
+    variance: FloatArray
+    own_variance: FloatArray
+
+
+def calibrate(errors: Sequence[ShapeErrors]) -> float:
+    """Give the factor on stated standard deviations with which they hold 90 % of the modes at left-out points.
+
+    What was measured at a left-out point has an error of its own, which a point of interest does not have: it comes off.
+
+    Parameters
+    ----------
+    errors : sequence of ShapeErrors
+        Of the points, taken together.
+
+    Returns
+    -------
+    float
+        1 or more.
+    """
+    squares = np.concatenate([each.difference**2 for each in errors])
+    stated = np.concatenate([each.variance for each in errors])
+    own = np.concatenate([each.own_variance for each in errors])
+
+    def excess(logarithm: float) -> float:
+        return float(np.quantile(squares / (np.exp(2 * logarithm) * stated + own), COVERED)) - COVERED_SQUARE
+
+    if excess(0.0) <= 0.0:
+        return 1.0
+    alone = 0.5 * np.log(float(np.quantile(squares / stated, COVERED)) / COVERED_SQUARE)  # with no error of its own
+    return float(np.exp(brentq(excess, 0.0, alone + 1.0)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,40 +89,25 @@ class LeftOutPoints:
         Median over lines and FRFs, after one factor a point where the scale of the test is unknown.
     log_ratio : (n_points,) array
         Logarithm of measured over predicted amplitude, the median over the modes.
-    calibration : (n_points,) array
-        Errors of the shape there over their stated standard deviations, so that these hold 90 % of its modes.
-    reciprocal : (n_points,) array
-        The same where the other side of the test, which has the point too, is kept; NaN where it does not have it.
+    errors : tuple of ShapeErrors
+        Errors of the shapes there.
+    is_told : (n_points,) bool array
+        The other side of the test has the point too, and no other that could stand for it: reciprocity tells it.
+    reciprocal : tuple of ShapeErrors
+        The errors at points that both sides have, where only this side is left out.
     """
 
     points: tuple[AnyDof, ...]
     error_db: FloatArray
     log_ratio: FloatArray
-    calibration: FloatArray
-    reciprocal: FloatArray
+    errors: tuple[ShapeErrors, ...]
+    is_told: BoolArray
+    reciprocal: tuple[ShapeErrors, ...]
 
 
-def side_with_more(fit: ModalFit) -> tuple[AnyDof, ...]:
-    """Name the points of the side of a test that has more of them.
-
-    Parameters
-    ----------
-    fit : ModalFit
-        The test.
-
-    Returns
-    -------
-    tuple of Dof or PortDof
-        Sensors or excited DOFs; sensors where there are as many.
-    """
-    outputs, inputs = (
-        tuple(dict.fromkeys(dofs))
-        for dofs in ([label.output_dof for label in fit.labels], [label.input_dof for label in fit.labels])
-    )
-    return outputs if len(outputs) >= len(inputs) else inputs
-
-
-def leave_points_out(fit: ModalFit, model: ReducedModel, *, error: float) -> LeftOutPoints | None:
+def leave_points_out(
+    fit: ModalFit, model: ReducedModel, *, error: float, doubts: Mapping[AnyDof, float] | None = None
+) -> LeftOutPoints | None:
     """Predict each measured point from the others.
 
     Parameters
@@ -82,6 +118,8 @@ def leave_points_out(fit: ModalFit, model: ReducedModel, *, error: float) -> Lef
         The model over which shapes are expanded.
     error : float
         Relative error of the measured amplitudes.
+    doubts : mapping of Dof or PortDof to float, optional
+        Relative errors of single points beside that.
 
     Returns
     -------
@@ -94,21 +132,19 @@ def leave_points_out(fit: ModalFit, model: ReducedModel, *, error: float) -> Lef
     chosen = [points[place] for place in np.unique(np.linspace(0, len(points) - 1, MOST).round().astype(int))]
     s = _lines(fit)
     measured = _heard(fit, s)
-    judged = {point: _judge(fit, model, point, _without(fit, point), error, s, measured) for point in chosen}
+    judge = partial(_judge, fit, model, error=error, doubts=doubts or {}, s=s, measured=measured)
+    judged = {point: judge(point, _without(fit, point)) for point in chosen}
     known = {point: judgement for point, judgement in judged.items() if judgement is not None}
     if not known:
         return None
-    beside = {
-        point: _judge(fit, model, point, _without(fit, point, other_side=False), error, s, measured)
-        for point in known
-        if _is_on_both_sides(fit, point)
-    }
+    beside = [judge(point, _without(fit, point, other_side=False)) for point in known if _is_on_both_sides(fit, point)]
     return LeftOutPoints(
         points=tuple(known),
         error_db=np.array([judgement.error_db for judgement in known.values()]),
         log_ratio=np.array([judgement.log_ratio for judgement in known.values()]),
-        calibration=np.array([judgement.calibration for judgement in known.values()]),
-        reciprocal=np.array([np.nan if (kept := beside.get(point)) is None else kept.calibration for point in known]),
+        errors=tuple(judgement.errors for judgement in known.values()),
+        is_told=np.array([_is_told(fit, point) for point in known], bool),
+        reciprocal=tuple(judgement.errors for judgement in beside if judgement is not None),
     )
 
 
@@ -177,16 +213,11 @@ def median_error_db(measured: ComplexArray, predicted: ComplexArray, *, is_level
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Judgement:
-    """A point predicted from the others: error, logarithm of a ratio, squared errors of shapes over their variance."""
+    """A point predicted from the others: error, logarithm of a ratio, errors of shapes."""
 
     error_db: float
     log_ratio: float
-    squares: FloatArray
-
-    @property
-    def calibration(self) -> float:
-        """Factor on standard deviations with which they hold most modes."""
-        return float(np.sqrt(np.quantile(self.squares, COVERED) / COVERED_SQUARE))
+    errors: ShapeErrors
 
 
 def _judge(
@@ -194,13 +225,15 @@ def _judge(
     model: ReducedModel,
     point: AnyDof,
     kept: BoolArray,
+    *,
     error: float,
+    doubts: Mapping[AnyDof, float],
     s: ComplexArray,
     measured: ComplexArray,
 ) -> _Judgement | None:
     """Predict a point from the FRFs that are kept; None where they do not tell it."""
     is_output, ends = _ends(fit, point)
-    others = measured_shapes(fit, kept=kept)
+    others = measured_shapes(fit, kept=kept, doubts=doubts)
     if others is None:
         return None
     is_known = fit.unknown_scale == "none"
@@ -228,7 +261,11 @@ def _judge(
     return _Judgement(
         error_db=median_error_db(measured[:, frfs], np.stack(predicted, axis=1), is_level_known=is_known),
         log_ratio=float(np.median(np.log(np.abs(shape[large] / at_point[large])))),
-        squares=(shape - at_point) ** 2 / variance,
+        errors=ShapeErrors(
+            difference=shape - at_point,
+            variance=variance,
+            own_variance=(error**2 + doubts.get(point, 0.0) ** 2) * at_point**2,
+        ),
     )
 
 
@@ -245,6 +282,11 @@ def _without(fit: ModalFit, point: AnyDof, *, other_side: bool = True) -> BoolAr
     there = np.array([end != point for end, _ in ends], bool)
     nowhere = there & np.array([partner.unsigned != point.unsigned for _, partner in ends], bool)
     return nowhere if other_side and nowhere.any() else there
+
+
+def _is_told(fit: ModalFit, point: AnyDof) -> bool:
+    """Tell whether the other side has a point that cannot be left out there, as nothing else is on that side."""
+    return all(partner.unsigned == point.unsigned for _, partner in _ends(fit, point)[1])
 
 
 def _is_on_both_sides(fit: ModalFit, point: AnyDof) -> bool:

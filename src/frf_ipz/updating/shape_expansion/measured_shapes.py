@@ -16,6 +16,8 @@ from frf_ipz.pairing.poles import measured_amplitudes
 from frf_ipz.rational import damping_ratio
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from frf_ipz.dofs import AnyDof
     from frf_ipz.identification.modal_fit import ModalFit
@@ -39,6 +41,8 @@ class MeasuredShapes:
         Directions, of norm 1.
     noise : (n_modes,) array
         Relative variance of the amplitudes of a mode.
+    doubt : (n_outputs + n_inputs,) array
+        Relative variance of what was measured at one point, beside that of all.
     """
 
     outputs: tuple[AnyDof, ...]
@@ -48,6 +52,7 @@ class MeasuredShapes:
     at_outputs: FloatArray
     at_inputs: FloatArray
     noise: FloatArray
+    doubt: FloatArray
 
     @property
     def omega(self) -> FloatArray:
@@ -60,7 +65,9 @@ class MeasuredShapes:
         return damping_ratio(self.poles)
 
 
-def measured_shapes(fit: ModalFit, *, kept: BoolArray | None = None) -> MeasuredShapes | None:
+def measured_shapes(
+    fit: ModalFit, *, kept: BoolArray | None = None, doubts: Mapping[AnyDof, float] | None = None
+) -> MeasuredShapes | None:
     """Take the shapes out of a fit.
 
     Parameters
@@ -69,6 +76,8 @@ def measured_shapes(fit: ModalFit, *, kept: BoolArray | None = None) -> Measured
         Of FRFs.
     kept : (n_frfs,) bool array, optional
         FRFs to take them from; all where it is left out.
+    doubts : mapping of Dof or PortDof to float, optional
+        Relative errors of points of the side that has more of them.
 
     Returns
     -------
@@ -88,6 +97,10 @@ def measured_shapes(fit: ModalFit, *, kept: BoolArray | None = None) -> Measured
         return None
     amplitudes, std = (values[:, kept] for values in measured_amplitudes(fit))
     gain = np.abs(fit.gain[kept]) if fit.unknown_scale == "none" else np.ones(len(labels))
+    doubted = outputs if side_with_more(fit) == _sides(fit)[0] else inputs
+    doubt = np.concatenate(
+        [[(doubts or {}).get(dof, 0.0) ** 2 if side is doubted else 0.0 for dof in side] for side in (outputs, inputs)]
+    )
     products = [_leading_product(mode, rows, columns) for mode in (amplitudes / gain).real]
     return MeasuredShapes(
         outputs=outputs,
@@ -97,6 +110,31 @@ def measured_shapes(fit: ModalFit, *, kept: BoolArray | None = None) -> Measured
         at_outputs=np.array([output for _, output, _ in products]),
         at_inputs=np.array([force for _, _, force in products]),
         noise=np.mean((std / gain) ** 2, axis=1) / np.maximum(np.mean(np.abs(amplitudes / gain) ** 2, axis=1), 1e-300),
+        doubt=doubt,
+    )
+
+
+def side_with_more(fit: ModalFit) -> tuple[AnyDof, ...]:
+    """Name the points of the side of a test that has more of them.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The test.
+
+    Returns
+    -------
+    tuple of Dof or PortDof
+        Sensors or excited DOFs; sensors where there are as many.
+    """
+    outputs, inputs = _sides(fit)
+    return outputs if len(outputs) >= len(inputs) else inputs
+
+
+def _sides(fit: ModalFit) -> tuple[tuple[AnyDof, ...], tuple[AnyDof, ...]]:
+    return (
+        tuple(dict.fromkeys(label.output_dof for label in fit.labels)),
+        tuple(dict.fromkeys(label.input_dof for label in fit.labels)),
     )
 
 

@@ -126,7 +126,7 @@ def expand_shape(model: ModalModel, measured: MeasuredShapes, mode: int, error: 
     noise = np.concatenate(
         [np.full(n_outputs, sizes[:n_outputs].mean()), np.full(count - n_outputs, sizes[n_outputs:].mean())]
     )
-    factor = linalg.cho_factor(prior + np.diag(noise * (error**2 + measured.noise[mode])), lower=True)
+    factor = linalg.cho_factor(prior + np.diag(noise * (error**2 + measured.noise[mode] + measured.doubt)), lower=True)
     output = np.concatenate([measured.at_outputs[mode], np.zeros(count - n_outputs)])
     force = np.concatenate([np.zeros(n_outputs), measured.at_inputs[mode]])
     by_output, by_force = linalg.cho_solve(factor, output), linalg.cho_solve(factor, force)

@@ -5,7 +5,6 @@ import pytest
 
 import frf_ipz
 from frf_ipz.updating.shape_expansion.between_points import inner_points, lies_between
-from frf_ipz.updating.shape_expansion.left_out_points import LeftOutPoints
 
 SENSORS = tuple(frf_ipz.Dof(node, "z") for node in (3, 5, 7, 9))
 
@@ -17,13 +16,6 @@ def beam():
     )
 
 
-def left_out(calibration):
-    zeros = np.zeros(len(SENSORS))
-    return LeftOutPoints(
-        points=SENSORS, error_db=zeros, log_ratio=zeros, calibration=np.array(calibration), reciprocal=zeros * np.nan
-    )
-
-
 def test_a_corner_of_a_plate_lies_beyond_and_its_middle_between():
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], float)
     assert lies_between(np.array([0.5, 0.5, 0.0]), corners)
@@ -31,14 +23,16 @@ def test_a_corner_of_a_plate_lies_beyond_and_its_middle_between():
     assert not lies_between(np.array([0.5, 0.5, 0.1]), corners)
 
 
-def test_inner_nodes_take_the_errors_of_inner_points(beam):
-    nodes, share = inner_points(left_out([4.0, 1.0, 2.0, 3.0]), SENSORS, beam.dofs, beam.geometry)
+def test_inner_nodes_and_points_lie_between_measured_ones(beam):
+    nodes, is_inner = inner_points(SENSORS, SENSORS, beam.dofs, beam.geometry)
     assert nodes == tuple(range(3, 10))
-    assert share == 0.5
+    assert list(is_inner) == [False, True, True, False]
 
 
-def test_without_places_all_points_take_the_largest_errors(beam):
-    assert inner_points(left_out([4.0, 1.0, 2.0, 3.0]), SENSORS, beam.dofs, None) == ((), 1.0)
+def test_without_places_no_point_is_known_to_lie_between_others(beam):
+    nodes, is_inner = inner_points(SENSORS, SENSORS, beam.dofs, None)
+    assert nodes == ()
+    assert not is_inner.any()
 
 
 def test_the_spread_is_whole_beyond_the_measured_points():
