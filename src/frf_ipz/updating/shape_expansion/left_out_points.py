@@ -52,7 +52,7 @@ class ShapeErrors:
 def calibrate(errors: Sequence[ShapeErrors]) -> float:
     """Give the factor on stated standard deviations with which they hold 90 % of the modes at left-out points.
 
-    What was measured at a left-out point has an error of its own, which a point of interest does not have: it comes off.
+    What was measured at a left-out point has an error of its own, which a point of interest has not: it comes off.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def calibrate(errors: Sequence[ShapeErrors]) -> float:
 
     if excess(0.0) <= 0.0:
         return 1.0
-    alone = 0.5 * np.log(float(np.quantile(squares / stated, COVERED)) / COVERED_SQUARE)  # with no error of its own
+    alone = 0.5 * np.log(float(np.quantile(squares / stated, COVERED)) / COVERED_SQUARE)  # without errors of their own
     return float(np.exp(brentq(excess, 0.0, alone + 1.0)))
 
 
