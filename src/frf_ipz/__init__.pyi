@@ -124,6 +124,7 @@ from .rational import ZeroSet as ZeroSet
 from .runs.results import Results as Results
 from .runs.results import open_results as open_results
 from .structure import Geometry as Geometry
+from .structure import Mesh as Mesh
 from .structure import Part as Part
 from .structure import ReducedModel as ReducedModel
 from .structure import StructuralModel as StructuralModel

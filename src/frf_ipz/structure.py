@@ -79,6 +79,42 @@ class Part(Concise):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Mesh(Concise):
+    """What is drawn of a structure: the surface of its elements, or lines between measured points.
+
+    Parameters
+    ----------
+    nodes : (n_nodes,) int array
+        Node numbers; those without a DOF, such as held ones, are among them.
+    coordinates_m : (n_nodes, 3) array
+        Their positions.
+    lines : (n_lines, 2) int array
+        Pairs of node numbers.
+    faces : (n_faces, 4) int array
+        Node numbers around; the last one of a triangle twice.
+
+    Examples
+    --------
+    >>> import numpy as np, frf_ipz
+    >>> frf_ipz.Mesh(
+    ...     nodes=np.array([1, 2, 3]), coordinates_m=np.eye(3), lines=np.array([[1, 2], [2, 3]]),
+    ...     faces=np.array([[1, 2, 3, 3]]),
+    ... ).faces.shape
+    (1, 4)
+    """
+
+    nodes: IntArray
+    coordinates_m: FloatArray
+    lines: IntArray
+    faces: IntArray
+
+    def __post_init__(self) -> None:
+        require_shape("coordinates_m", self.coordinates_m, (len(self.nodes), 3))
+        require_shape("lines", self.lines, (len(self.lines), 2))
+        require_shape("faces", self.faces, (len(self.faces), 4))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Geometry(Concise):
     """Where the nodes are, for drawing and for positions along the structure.
 
@@ -96,6 +132,8 @@ class Geometry(Concise):
         Coordinates are no positions: the masses of a lumped model drawn in a row.
     ports : mapping of str to tuple of int
         The nodes that each port joins.
+    mesh : Mesh, optional
+        What is drawn, where a file says what lies between nodes.
 
     Examples
     --------
@@ -114,6 +152,30 @@ class Geometry(Concise):
     supports: Mapping[int, str] = field(default_factory=dict)
     is_schematic: bool = False
     ports: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    mesh: Mesh | None = None
+
+    def outline(self, nodes: Iterable[int] = ()) -> Mesh:
+        """Give what is drawn.
+
+        Parameters
+        ----------
+        nodes : iterable of int
+            Nodes that are drawn in any case, as far as they are known.
+
+        Returns
+        -------
+        Mesh
+            With its faces where a file says what lies between nodes; else all nodes and lines.
+        """
+        if self.mesh is None:
+            none = np.zeros((0, 4), np.int64)
+            return Mesh(nodes=self.nodes, coordinates_m=self.coordinates_m, lines=self.lines, faces=none)
+        beside = np.isin(self.nodes, list(set(nodes) - set(self.mesh.nodes.tolist())))
+        return replace(
+            self.mesh,
+            nodes=np.concatenate([self.mesh.nodes, self.nodes[beside]]),
+            coordinates_m=np.vstack([self.mesh.coordinates_m, self.coordinates_m[beside]]),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -714,7 +776,12 @@ def _places_of(dofs: tuple[AnyDof, ...]) -> dict[AnyDof, int]:
 
 
 def drawn_geometry(
-    matrices: ModelMatrices, nodes: IntArray, positions_m: FloatArray, *, is_schematic: bool = False
+    matrices: ModelMatrices,
+    nodes: IntArray,
+    positions_m: FloatArray,
+    *,
+    is_schematic: bool = False,
+    mesh: Mesh | None = None,
 ) -> Geometry:
     """Find how to draw a model of which only matrices are known.
 
@@ -728,6 +795,8 @@ def drawn_geometry(
         Their positions.
     is_schematic : bool
         Positions are those of nodes in a row.
+    mesh : Mesh, optional
+        What lies between nodes, where a file says it.
 
     Returns
     -------
@@ -752,6 +821,7 @@ def drawn_geometry(
         ),
         supports=matrices.supports,
         is_schematic=is_schematic,
+        mesh=mesh,
     )
 
 

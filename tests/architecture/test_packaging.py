@@ -21,7 +21,7 @@ LOCKED = {
     "test": [*BUILD, *PROJECT["dependencies"], *EXTRAS["test"]],
     "docs": [*BUILD, *PROJECT["dependencies"], *EXTRAS["docs"]],
 }
-READERS = {"tdms", "mdf", "nastran", "ansys"}  # the tests' lock holds what they need
+READERS = {"tdms", "mdf", "nastran", "ansys", "mesh"}  # the tests' lock holds what they need
 UNLOCKED = {"peers", "mkl", *READERS, "cluster"}
 FORBIDDEN_ON_WINDOWS = re.compile(r'[<>:"\\|?*]|(^|/)(con|prn|aux|nul|com\d|lpt\d)(\.|/|$)|[ .](/|$)', re.IGNORECASE)
 

@@ -21,7 +21,6 @@ from fe_models import BEAM_TEXT, LUMPED_TEXT
 from frf_ipz.errors import FrfIpzError
 from frf_ipz.fe.matrices.dof_table import read_dof_table
 from frf_ipz.fe.matrices.formats.matrix_market import read_matrix_market
-from frf_ipz.fe.matrices.node_positions import read_positions
 from frf_ipz.fe.matrices.registry import read_matrix
 from frf_ipz.fe.matrices.row_tables import read_rows
 from frf_ipz.fe.matrices.stored import MatrixRequest
@@ -32,6 +31,7 @@ from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.formats.modes_file import ModesSource
 from frf_ipz.ingest.formats.registry import open_recording, read_modes_file
 from frf_ipz.json_files import read_json
+from frf_ipz.meshes.registry import read_mesh
 from frf_ipz.pipeline.config import read_pipeline
 from frf_ipz.runs.manifest import load_manifest
 from frf_ipz.runs.stage_file import StageFile, read_stage_file, write_stage_file
@@ -306,7 +306,7 @@ PARSERS = {
     "labels.mtx": ("** K\n1,1,1,1, 2.0e3\n2,1,1,1,-1.0e3\n2,1,2,1,1.0e3\n-1,0,2,1,1.0\n", read_any_matrix),
     "K.hb": (HARWELL_BOEING, read_any_matrix),
     "job.dof": ("1.1\n1.2\n2.1\n", read_rows),
-    "deck.inp": ("*NODE\n1, 0., 0., 0.\n2, 1.5, 0.\n*ELEMENT\n1,1,2\n", read_positions),
+    "deck.inp": ("*NODE\n1, 0., 0., 0.\n2, 1.5, 0.\n*ELEMENT\n1,1,2\n", read_mesh),
     "K.npz": (None, read_any_matrix),
     "K.npy": (None, read_any_matrix),
     "K.mat": (None, read_any_matrix),
@@ -316,8 +316,8 @@ PARSERS = {
     "job.pch": (PUNCHED, read_any_matrix),
     "rows.op2": (None, read_rows),
     "rows.mapping": (MAPPING, read_rows),
-    "deck.bdf": (DECK, read_positions),
-    "nodes.csv": ("node,x,y,z\n1,0,0,0\n2,1.5,0,0\n", read_positions),
+    "deck.bdf": (DECK, read_mesh),
+    "nodes.csv": ("node,x,y,z\n1,0,0,0\n2,1.5,0,0\n", read_mesh),
     "frf.mat": (None, read_arrays),
     "frd.mat": (None, read_arrays),
     "testlab.mat": (None, read_arrays),

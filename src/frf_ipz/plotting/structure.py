@@ -177,12 +177,14 @@ def _nodes_of(location: Location, frfs: FrfSet | None) -> list[int]:
 
 def _plan(geometry: Geometry | None, marks: StructureMarks) -> tuple[IntArray, FloatArray, IntArray]:
     """Nodes, their positions on the drawing, and lines as pairs of nodes."""
+    dofs = (*marks.sensors, *marks.inputs, *marks.points)
     if geometry is None:
-        dofs = (*marks.sensors, *marks.inputs, *marks.points)
         nodes = np.array(sorted({dof.node for dof in node_dofs(dofs) if dof.node > 0}), np.int64)
         positions = np.stack([nodes, np.zeros(len(nodes))], 1).astype(float)
         return nodes, positions, np.stack([nodes[:-1], nodes[1:]], 1)
-    return geometry.nodes, project(geometry.coordinates_m), geometry.lines
+    named = {dof.node for dof in node_dofs(dofs)} | {node for joined in geometry.ports.values() for node in joined}
+    mesh = geometry.outline({*named, *geometry.supports, *marks.missing, *marks.mismatch})
+    return mesh.nodes, project(mesh.coordinates_m), mesh.lines
 
 
 def _body(positions: FloatArray, lines: IntArray, rows: Mapping[int, int], *, is_line: bool) -> Line:

@@ -6,21 +6,25 @@ turns and animates them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.dofs import Dof, PortDof, node_dofs
+from frf_ipz.dofs import Dof, PortDof
 from frf_ipz.errors import InputError
+from frf_ipz.late_imports import import_late
 from frf_ipz.modes import modal_assurance
 from frf_ipz.numerics.closed_faces import faces_between_lines
 from frf_ipz.numerics.pencils import damped_poles
 from frf_ipz.rational import natural_frequency_hz
+from frf_ipz.structure import Mesh
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
+
+    from scipy import spatial
 
     from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
@@ -28,6 +32,8 @@ if TYPE_CHECKING:
     from frf_ipz.numerics.pencils import Roots
     from frf_ipz.runs.results import Results
     from frf_ipz.structure import Geometry, ReducedModel
+else:
+    spatial = import_late("scipy.spatial")
 
 STEPS = 10_000  # whole numbers over the largest extent: finer than any screen
 MOST_NODES = 3000  # that are drawn; of more, some
@@ -320,31 +326,26 @@ class Structure:
         Structure
             What is drawn.
         """
-        named = {dof.node for dof in node_dofs(dofs) if dof.node > 0}
-        if geometry is None:
-            nodes = np.array(sorted(named), np.int64)
-            positions = np.zeros((len(nodes), 3))
-            positions[:, 0] = nodes
-            pairs = np.stack([nodes[:-1], nodes[1:]], 1)
-        else:
-            is_drawn = np.ones(len(geometry.nodes), bool)
-            if len(geometry.nodes) > MOST_NODES:
-                is_drawn = np.isin(geometry.nodes, list(named))
-                is_drawn[:: -(-len(geometry.nodes) // MOST_NODES)] = True
-            nodes, positions, pairs = geometry.nodes[is_drawn], geometry.coordinates_m[is_drawn], geometry.lines
-        rows = {int(node): row for row, node in enumerate(nodes)}
-        lines = [[rows[int(a)], rows[int(b)]] for a, b in pairs if int(a) in rows and int(b) in rows]
         ports = {} if geometry is None else geometry.ports
+        named = {node for dof in dofs for node in _nodes_of(dof, ports) if node > 0}
+        if geometry is None:
+            mesh = _row_of(sorted(named))
+        else:
+            mesh = geometry.outline(named)
+            mesh = _thinned(mesh, named) if len(mesh.nodes) > MOST_NODES else mesh
+        rows = {int(node): row for row, node in enumerate(mesh.nodes)}
+        lines = [[rows[a], rows[b]] for a, b in mesh.lines.tolist()]
+        faces = [tuple(dict.fromkeys(rows[node] for node in face)) for face in mesh.faces.tolist()]
         marks = [
             {"kind": kind, "text": str(dof), "rows": [rows[node] for node in _nodes_of(dof, ports) if node in rows]}
             for kind, marked in (kinds or {}).items()
             for dof in marked
         ]
         return cls(
-            nodes=nodes,
-            positions_m=positions,
+            nodes=mesh.nodes,
+            positions_m=mesh.coordinates_m,
             lines=lines,
-            faces=faces_between_lines(lines, positions),
+            faces=faces or faces_between_lines(lines, mesh.coordinates_m),
             marks=[mark for mark in marks if mark["rows"]],
         )
 
@@ -377,6 +378,39 @@ class Structure:
             "isRow": self.is_row,
             "reach": REACH * STEPS,
         }
+
+
+def _row_of(nodes: Sequence[int]) -> Mesh:
+    """Nodes of which nobody knows where they are, by their numbers."""
+    places = np.zeros((len(nodes), 3))
+    places[:, 0] = nodes
+    numbers = np.array(nodes, np.int64)
+    pairs = np.stack([numbers[:-1], numbers[1:]], 1)
+    return Mesh(nodes=numbers, coordinates_m=places, lines=pairs, faces=np.zeros((0, 4), np.int64))
+
+
+def _thinned(mesh: Mesh, named: set[int]) -> Mesh:
+    """Draw some of many nodes, and what lies between others between those nearest to them."""
+    is_drawn = np.isin(mesh.nodes, list(named))
+    is_drawn[:: -(-len(mesh.nodes) // MOST_NODES)] = True
+    drawn, order = np.flatnonzero(is_drawn), np.argsort(mesh.nodes)
+    nearest = drawn[spatial.cKDTree(mesh.coordinates_m[drawn]).query(mesh.coordinates_m)[1]]
+
+    def moved(numbers: IntArray) -> IntArray:
+        places = order[np.searchsorted(mesh.nodes[order], numbers)]
+        ends = mesh.nodes[nearest[places]]
+        _, first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)
+        return np.asarray(ends[np.sort(first)])
+
+    lines, faces = moved(mesh.lines), moved(mesh.faces)
+    has_area = np.array([len(set(face)) > 2 for face in faces.tolist()], bool)
+    return replace(
+        mesh,
+        nodes=mesh.nodes[drawn],
+        coordinates_m=mesh.coordinates_m[drawn],
+        lines=lines[lines[:, 0] != lines[:, 1]],
+        faces=faces[has_area],
+    )
 
 
 def _nodes_of(dof: AnyDof, ports: Mapping[str, tuple[int, ...]]) -> tuple[int, ...]:

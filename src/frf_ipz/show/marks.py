@@ -76,11 +76,12 @@ def with_retained(picture: Picture, geometry: Geometry, dofs: Sequence[AnyDof]) 
     Picture
         With the rings.
     """
-    rows = {int(node): row for row, node in enumerate(geometry.nodes)}
+    mesh = geometry.outline(dof.node for dof in node_dofs(dofs))
+    rows = {int(node): row for row, node in enumerate(mesh.nodes)}
     known = [dof for dof in node_dofs(dofs) if dof.node in rows]
     if not known:
         return picture
-    coordinates = project(geometry.coordinates_m)[[rows[dof.node] for dof in known]]
+    coordinates = project(mesh.coordinates_m)[[rows[dof.node] for dof in known]]
     names = [dof.name for dof in known]
     rings = Points(
         name="retained in the reduction",

@@ -175,6 +175,25 @@ def test_positions_come_from_decks(tmp_path, deck, name):
     assert_allclose(read_model(path).geometry.coordinates_m, [[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]])
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("mm", 1000.0)])
+def test_elements_are_drawn_with_held_nodes_and_in_the_unit_of_the_file(tmp_path, unit, factor):
+    factors = f"{factor:25.17E}{1.0:25.17E}{1.0:25.17E}\n{0.0:25.17E}".replace("E", "D")
+    rows = "\n".join(
+        f"{n:10d}{0:10d}{0:10d}{0:10d}\n{0.1 * factor * (n - 1):25.16E}{0.0:25.16E}{0.0:25.16E}" for n in range(5)
+    )
+    frame = f"{1:10d}{4:10d}{1:10d}\nframe\n" + "".join(f"{n:10d}" for n in range(1, 5))
+    sets = {164: f"{1:10d}{unit:<20}{2:10d}\n{factors}", 2411: rows, 82: frame}
+    (tmp_path / "a.unv").write_text("".join(f"    -1\n{kind:6d}\n{text}\n    -1\n" for kind, text in sets.items()))
+    (tmp_path / "job.dof").write_text("1.1\n2.1\n3.1\n")
+    np.savez(tmp_path / "fem.npz", K=STIFFNESS, M=MASS)
+    path = model_toml(tmp_path, "fem.npz", "fem.npz", 'nodes = "a.unv"', dofs='dofs = "job.dof"')
+    geometry = read_model(path).geometry
+    assert_allclose(geometry.coordinates_m, [[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]])
+    assert geometry.mesh.nodes.tolist() == [1, 2, 3, 4]  # the last one has no row
+    assert_allclose(geometry.mesh.coordinates_m[:, 0], [0, 0.1, 0.2, 0.3])
+    assert geometry.mesh.lines.tolist() == [[1, 2], [2, 3], [3, 4]]
+
+
 REFUSED = {
     "several matrices": (lambda f: np.savez(f / "K.npz", A=MASS, B=MASS), "K.npz", ["A, B", "variables"]),
     "no matrix": (lambda f: np.savez(f / "K.npz", A=np.zeros(3)), "K.npz", ["no square matrix"]),

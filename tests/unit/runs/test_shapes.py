@@ -24,7 +24,7 @@ from frf_ipz.runs.shapes import (
     mode_shape,
     operating_shape,
 )
-from frf_ipz.structure import Geometry
+from frf_ipz.structure import Geometry, Mesh
 
 ROUNDING = 1e-9  # of the largest value: a 5 by 5 solve, and eigenvectors of a lightly damped pencil
 LABELS = (
@@ -196,3 +196,51 @@ def test_of_many_nodes_those_that_were_measured_are_drawn():
     structure, (measured,) = drawn_on(geometry, (shape_of([1.0, 2.0], [2, 8999], "z"),))
     assert len(structure["nodes"]) <= MOST_NODES + 3
     assert [structure["nodes"][row] for row in measured["rows"]] == [2, 8999]
+
+
+def plate_of_quadrilaterals(count):
+    """A square of count by count faces whose nodes are those of a model, but for the first row, which is held."""
+    across = np.arange(count + 1)
+    grid = 1 + across + (count + 1) * across[:, None]
+    corners = [grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]]
+    faces = np.stack([part.ravel() for part in corners], 1)
+    places = np.stack([*(part.ravel() / count for part in np.meshgrid(across, across)), np.zeros(grid.size)], 1)
+    lines = np.unique(np.sort(np.stack([faces, np.roll(faces, 1, axis=1)], 2).reshape(-1, 2), axis=1), axis=0)
+    mesh = Mesh(nodes=grid.ravel(), coordinates_m=places, lines=lines, faces=faces)
+    moving = grid[1:].ravel()
+    return Geometry(nodes=moving, coordinates_m=places[count + 1 :], lines=np.zeros((0, 2), int), mesh=mesh)
+
+
+def test_faces_of_a_mesh_are_drawn_and_held_nodes_stay():
+    geometry = plate_of_quadrilaterals(3)
+    structure = Structure.of(geometry, [Dof(16, "z")])
+    assert len(structure.faces) == 9
+    assert len(structure.nodes) == 16
+    dofs = tuple(Dof(int(node), "z") for node in geometry.nodes)
+    shape = Shape(title="", motions=(Motion(name="measured", title="", dofs=dofs, values=np.ones(12, complex)),))
+    motion = draw_shape(shape, structure)["motions"][0]
+    assert motion["isWhole"]
+    assert [row[2] > 0 for row in motion["real"]] == [False] * 4 + [True] * 12
+
+
+def test_of_many_nodes_the_surface_stays_closed():
+    geometry = plate_of_quadrilaterals(99)
+    structure = Structure.of(geometry, [Dof(777, "z")])
+    assert len(structure.nodes) <= MOST_NODES
+    assert 777 in structure.nodes
+    corners = structure.positions_m[:, :2]
+    area = 0.0
+    for face in structure.faces:
+        x, y = corners[list(face)].T
+        area += abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))) / 2
+    assert 0.9 < area < 1.1
+
+
+def test_a_sensor_inside_of_a_mesh_is_drawn_beside_it():
+    geometry = plate_of_quadrilaterals(2)
+    inside = Geometry(
+        nodes=np.append(geometry.nodes, 50), coordinates_m=np.vstack([geometry.coordinates_m, [[0.5, 0.5, -0.1]]]),
+        lines=geometry.lines, mesh=geometry.mesh,
+    )  # fmt: skip
+    assert 50 not in Structure.of(inside, []).nodes
+    assert 50 in Structure.of(inside, [Dof(50, "z")]).nodes

@@ -13,11 +13,11 @@ from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.dofs import GENERALISED, Dof
 from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.fe.assembly import stated_damping
-from frf_ipz.fe.matrices.node_positions import read_positions
 from frf_ipz.fe.matrices.registry import read_matrix
 from frf_ipz.fe.matrices.row_tables import read_rows
 from frf_ipz.fe.matrices.stored import MatrixRequest, StoredMatrix
 from frf_ipz.fe.model_options import DampingSection, ModelSection, PortSection
+from frf_ipz.meshes.registry import read_mesh
 from frf_ipz.numerics.structural_matrices import MatrixOptions, ModelMatrices
 from frf_ipz.option_types import Name
 from frf_ipz.structure import Part, StructuralModel, drawn_geometry
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from frf_ipz.arrays import Matrix
+    from frf_ipz.structure import Mesh
 
 KIND = "matrices"
 SUM_TOLERANCE = 1e-6  # of a diagonal entry: rounding of printed groups may add up to that
@@ -85,7 +86,9 @@ class MatricesOptions:
     damping : str, optional
         File of viscous damping.
     nodes : str, optional
-        Where nodes are, if the rows' file does not say it: CSV ``node,x,y,z``, or the deck (``.inp``, ``.bdf``).
+        Where nodes are, if the rows' file does not say it, and what lies between them, for the drawing: a deck
+        (``.inp``, ``.bdf``), a universal file, an archive of Ansys (``.cdb``), a mesh (``.msh``, ``.vtu``, ...); or
+        positions alone as CSV ``node,x,y,z``.
     variables : MatrixNames, optional
         What the matrices are called in files that hold several.
     group : tuple of MatrixGroup
@@ -184,8 +187,8 @@ def read(file: MatricesFile, path: Path) -> StructuralModel:
     names = {"stiffness": options.stiffness, "mass": options.mass}
     if options.damping is not None:
         names["damping"] = options.damping
-    files = _Files.read(path, options, names)
     units = file.model.system
+    files = _Files.read(path, options, names, units.length_m)
     matrices = ModelMatrices.of(
         {what: stored.matrix for what, stored in files.whole.items()},
         files.dofs,
@@ -201,7 +204,9 @@ def read(file: MatricesFile, path: Path) -> StructuralModel:
     model = StructuralModel.from_model_matrices(
         matrices,
         name=file.model.name,
-        geometry=drawn_geometry(matrices, nodes, units.length_m * positions, is_schematic=is_schematic),
+        geometry=drawn_geometry(
+            matrices, nodes, units.length_m * positions, is_schematic=is_schematic, mesh=files.mesh
+        ),
         modal_damping=np.zeros(0),
         allow_negative_stiffness=options.allow_negative_stiffness,
     )
@@ -227,9 +232,10 @@ class _Files:
     axes: Mapping[int, FloatArray]
     positions: Mapping[int, Sequence[float]]
     whole: Mapping[str, StoredMatrix]
+    mesh: Mesh | None
 
     @classmethod
-    def read(cls, path: Path, options: MatricesOptions, names: Mapping[str, str]) -> _Files:
+    def read(cls, path: Path, options: MatricesOptions, names: Mapping[str, str], unit_m: float) -> _Files:
         table = read_rows(path.parent / options.dofs) if options.dofs is not None else None
         ordered_by = options.dofs or options.stiffness
         if table is not None and table.choices:
@@ -250,12 +256,17 @@ class _Files:
                 dofs = stored.dofs
             positions = {**stored.positions, **positions}
             whole[what] = stored.in_rows(dofs, path.parent / name, ordered_by)
+        mesh = None
         if options.nodes is not None:
-            positions = dict(read_positions(path.parent / options.nodes))
+            stored_mesh = read_mesh(path.parent / options.nodes)
+            scale = (stored_mesh.unit_m or unit_m) / unit_m
+            positions = {node: (scale * x, scale * y, scale * z) for node, (x, y, z) in stored_mesh.positions.items()}
+            mesh = stored_mesh.drawn(unit_m)
         axes = {} if table is None else table.axes
         return cls(
-            path=path, options=options, dofs=dofs, ordered_by=ordered_by, axes=axes, positions=positions, whole=whole
-        )
+            path=path, options=options, dofs=dofs, ordered_by=ordered_by, axes=axes, positions=positions, whole=whole,
+            mesh=mesh,
+        )  # fmt: skip
 
     def notes(self, what: str) -> tuple[str, ...]:
         return self.whole[what].notes if what in self.whole else ()

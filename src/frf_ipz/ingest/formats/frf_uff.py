@@ -16,12 +16,12 @@ from frf_ipz.ingest.formats.universal_file import (
     TIME_RESPONSE,
     describe_functions,
     find_dof,
-    is_universal,
     read_functions,
 )
 from frf_ipz.ingest.units import frequency_factor, frf_factor, is_stated, unit_ratio
 from frf_ipz.input_files import read_bytes
 from frf_ipz.quantities import FrfQuantity
+from frf_ipz.universal_sets import is_universal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

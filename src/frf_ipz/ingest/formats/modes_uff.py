@@ -15,10 +15,9 @@ import numpy as np
 from frf_ipz.dofs import DIRECTIONS, Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats.modes_file import ModesSource, make_modes
-from frf_ipz.ingest.formats.universal_file import is_universal
-from frf_ipz.input_files import read_bytes
+from frf_ipz.input_files import open_input
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
-from frf_ipz.text_numbers import NumberError, parse_numbers
+from frf_ipz.universal_sets import DataSet, is_universal, read_data_sets
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,11 +25,10 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.modes import ModalParameters
 
-END = "-1"
 NORMAL_MODE, COMPLEX_MODES = 2, (3, 7)  # the latter of displacements, or of velocities
 REAL, COMPLEX = (2, 4), (5, 6)  # types of data, of single and of double precision
 PER_LINE = 6  # numbers
-LARGEST = 999_999_999  # integer of a field of ten columns
+HEAD_BYTES = 4096
 NAMES, RESULTS = "55", "2414"  # kinds of data sets
 N_LINES = {NAMES: 5, RESULTS: 8}  # before the types: texts; of results also a label, and where the data are
 AT_NODES = 1  # such data
@@ -55,8 +53,7 @@ class _ModesUff:
         return is_universal(head)
 
     def read_modes(self, source: ModesSource) -> ModalParameters:
-        lines = read_bytes(source.path).decode("latin-1").splitlines()
-        shapes = [_read_shape(data) for data in _data_sets(source.path, lines)]
+        shapes = [_read_shape(data) for data in _modes_of(source.path)]
         if not shapes:
             raise FileFormatError(source.path, f"holds no mode shape (data set 55 or 2414); {ADVICE}")
         nodes = list(dict.fromkeys(node for shape in shapes for node in shape.values))
@@ -91,72 +88,33 @@ def holds_shapes(path: Path) -> bool:
     bool
         True where it is.
     """
-    data = read_bytes(path)
+    with open_input(path) as stream:
+        head = stream.read(HEAD_BYTES)
     try:
-        return is_universal(data[:4096]) and bool(_data_sets(path, data.decode("latin-1").splitlines()))
+        return is_universal(head) and bool(_modes_of(path))
     except FileFormatError:  # said where the modes are read
         return True
 
 
-def _data_sets(path: Path, lines: list[str]) -> list[_DataSet]:
+def _modes_of(path: Path) -> list[DataSet]:
     """Find the data sets 55, and those 2414 that are modes: other results of a computation stand beside them."""
-    marks = [number for number, line in enumerate(lines) if line.strip() == END]
-    sets = [
-        _DataSet(path=path, lines=lines, kind=lines[begin + 1].strip(), first=begin + 2, end=end)
-        for begin, end in zip(marks[::2], [*marks[1::2], len(lines)], strict=False)
-        if begin + 1 < len(lines) and lines[begin + 1].strip() in N_LINES
-    ]
-    return [data for data in sets if data.kind == NAMES or data.is_mode]
+    return [data for data in read_data_sets(path, set(N_LINES), advice=ADVICE) if data.kind == NAMES or _is_mode(data)]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _DataSet:
-    """Lines of one data set 55 or 2414: the first behind its number, and the one behind its last."""
-
-    path: Path
-    lines: list[str]
-    kind: str
-    first: int
-    end: int
-
-    @property
-    def types(self) -> int:
-        """Line of the types."""
-        return self.first + N_LINES[self.kind]
-
-    @property
-    def is_mode(self) -> bool:
-        """Results that are motions of nodes in modes; what is damaged is said where it is read."""
-        location = self.integers(self.first + 2, 10, 1, "where data are")[0]
-        _, analysis, _, result, *_ = self.integers(self.types, 10, 6, "the types of a data set 2414")
-        return location == AT_NODES and analysis in {NORMAL_MODE, *COMPLEX_MODES} and result in MOTIONS
-
-    def numbers(self, line: int, width: int, count: int, what: str) -> list[float]:
-        """Read numbers by the blanks between them, or by columns where they touch."""
-        text = self.lines[line] if line < self.end else ""
-        for fields in (text.split(), [text[at : at + width] for at in range(0, len(text.rstrip()), width)]):
-            try:
-                values = parse_numbers([field.strip() for field in fields])
-            except NumberError:
-                continue
-            if len(values) >= count:
-                return [float(value) for value in values]
-        problem = f"{what} should stand there, {count} numbers at least; the file is cut off, or none"
-        raise self.fault(problem, line)
-
-    def integers(self, line: int, width: int, count: int, what: str) -> list[int]:
-        """Read integers of at most nine digits."""
-        values = self.numbers(line, width, count, what)
-        if any(value != round(value) or abs(value) > LARGEST for value in values[:count]):
-            raise self.fault(f"{what} should stand there, as integers", line)
-        return [round(value) for value in values[:count]]
-
-    def fault(self, problem: str, line: int) -> FileFormatError:
-        return FileFormatError(self.path, f"{problem}; {ADVICE}", where=f"line {min(line, self.end - 1) + 1}")
+def _is_mode(data: DataSet) -> bool:
+    """Tell whether results are motions of nodes in a mode."""
+    location = data.integers(data.first + 2, 10, 1, "where data are")[0]
+    _, analysis, _, result, *_ = data.integers(_types(data), 10, 6, "the types of a data set 2414")
+    return location == AT_NODES and analysis in {NORMAL_MODE, *COMPLEX_MODES} and result in MOTIONS
 
 
-def _read_shape(data: _DataSet) -> _Shape:
-    at = data.types
+def _types(data: DataSet) -> int:
+    """Line of the types."""
+    return data.first + N_LINES[data.kind]
+
+
+def _read_shape(data: DataSet) -> _Shape:
+    at = _types(data)
     _, analysis, _, _, data_type, n_values = data.integers(at, 10, 6, f"the types of a data set {data.kind}")
     is_complex = data_type in COMPLEX
     if analysis not in (NORMAL_MODE, *COMPLEX_MODES) or not (is_complex or data_type in REAL):
@@ -175,7 +133,7 @@ def _read_shape(data: _DataSet) -> _Shape:
     return _Shape(frequency_hz=frequency_hz, ratio=ratio, values=values)
 
 
-def _read_pole(data: _DataSet, line: int, analysis: int, n_real: int) -> tuple[float, float]:
+def _read_pole(data: DataSet, line: int, analysis: int, n_real: int) -> tuple[float, float]:
     """Read frequency and damping ratio of a data set 55."""
     values = data.numbers(line, 13, min(max(n_real, 2), 4), "the frequency of a mode")
     if analysis in COMPLEX_MODES:
@@ -184,7 +142,7 @@ def _read_pole(data: _DataSet, line: int, analysis: int, n_real: int) -> tuple[f
     return _checked(data, line, values[0], viscous, hysteretic)
 
 
-def _read_result_pole(data: _DataSet, line: int, analysis: int) -> tuple[float, float]:
+def _read_result_pole(data: DataSet, line: int, analysis: int) -> tuple[float, float]:
     """Read frequency and damping ratio of a data set 2414, whose eigenvalue programs may leave out."""
     _, frequency_hz, _, _, viscous, hysteretic = data.numbers(line, 13, 6, "the frequency of a mode")[:6]
     eigenvalue = complex(*data.numbers(line + 1, 13, 2, "the eigenvalue of a mode")[:2])
@@ -193,12 +151,12 @@ def _read_result_pole(data: _DataSet, line: int, analysis: int) -> tuple[float, 
     return _checked(data, line, frequency_hz, viscous, hysteretic)
 
 
-def _of_pole(data: _DataSet, line: int, value: complex) -> tuple[float, float]:
+def _of_pole(data: DataSet, line: int, value: complex) -> tuple[float, float]:
     pole = np.array(complex(value.real, abs(value.imag)))
     return _checked(data, line, float(natural_frequency_hz(pole)), float(damping_ratio(pole)), 0.0)
 
 
-def _checked(data: _DataSet, line: int, frequency_hz: float, viscous: float, hysteretic: float) -> tuple[float, float]:
+def _checked(data: DataSet, line: int, frequency_hz: float, viscous: float, hysteretic: float) -> tuple[float, float]:
     """Give frequency and damping ratio; a loss factor is twice the viscous ratio that dissipates as much."""
     ratio = viscous or hysteretic / 2
     if not ratio > 0:
@@ -207,7 +165,7 @@ def _checked(data: _DataSet, line: int, frequency_hz: float, viscous: float, hys
     return frequency_hz, ratio
 
 
-def _read_motions(data: _DataSet, line: int, n_numbers: int) -> dict[int, FloatArray]:
+def _read_motions(data: DataSet, line: int, n_numbers: int) -> dict[int, FloatArray]:
     """Read the numbers of each node, on as many lines as they take."""
     of_nodes: dict[int, FloatArray] = {}
     while line < data.end:

@@ -12,11 +12,11 @@ from frf_ipz.ingest.formats.universal_file import (
     TIME_RESPONSE,
     describe_functions,
     find_dof,
-    is_universal,
     read_functions,
 )
 from frf_ipz.ingest.units import is_stated
 from frf_ipz.input_files import read_bytes
+from frf_ipz.universal_sets import is_universal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -105,24 +105,6 @@ class UniversalFunction:
         return self.response_node, self.response_direction, self.reference_node, self.reference_direction
 
 
-def is_universal(head: bytes) -> bool:
-    """Tell whether a file is a universal file.
-
-    Parameters
-    ----------
-    head : bytes
-        Its first bytes.
-
-    Returns
-    -------
-    bool
-        True if its first line that is not empty is ``-1`` and its second a number of a data set.
-    """
-    lines = head.lstrip(b"\r\n \t").replace(b"\r", b"\n").split(b"\n", 3)
-    lines = [line.strip() for line in lines if line.strip()]
-    return len(lines) > 1 and lines[0] == b"-1" and lines[1][:1].isdigit()
-
-
 def find_dof(node: int, direction: int) -> Dof | None:
     """Make the DOF of an end of a function.
 

@@ -1,0 +1,1 @@
+"""Formats of meshes: one module each, with a ``FORMAT``."""

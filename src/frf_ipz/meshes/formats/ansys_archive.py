@@ -1,0 +1,60 @@
+"""Archives of Ansys (``.cdb``, by ``CDWRITE``), by mapdl-archive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from frf_ipz.foreign_errors import errors_of_reader, import_reader
+from frf_ipz.input_files import read_bytes
+from frf_ipz.meshes.mesh_file import MOST_BYTES, MeshFormat, StoredMesh
+from frf_ipz.meshes.outer_faces import (
+    CORNERS,
+    HEXAHEDRON,
+    LINE,
+    PYRAMID,
+    QUADRILATERAL,
+    TETRAHEDRON,
+    TRIANGLE,
+    WEDGE,
+)
+from frf_ipz.output_files import write_bytes
+
+KIND = "an archive of Ansys"
+FIRST_NODE = 10  # of a row of an element; its material, type and so on stand before
+TYPE = 1
+BARS = {1, 3, 4, 8, 10, 14, 16, 21, 33, 39, 40, 44, 54, 180, 188, 189, 288, 289, 290}
+SHELLS = {25, 28, 41, 42, 43, 63, 82, 83, 91, 93, 99, 131, 132, 143, 150, 157, 163, 181, 182, 183, 208, 209, 281}
+TETRAHEDRA = {72, 87, 92, 98, 123, 127, 148, 168, 187, 227, 232, 237, 285, 291}
+
+
+def _read(path: Path) -> StoredMesh:
+    mapdl = import_reader(path, "mapdl_archive", kind=KIND, extra="mesh")
+    with TemporaryDirectory() as folder, errors_of_reader(path, KIND):
+        copy = Path(folder) / "mesh.cdb"
+        write_bytes(copy, read_bytes(path, most_bytes=MOST_BYTES))
+        archive = mapdl.Archive(copy, parse_vtk=False)
+        numbers, places = archive.nnum.tolist(), archive.nodes[:, :3].tolist()
+        kinds = {int(number): int(kind) for number, kind in archive.ekey.tolist()}
+        rows = [row.tolist() for row in archive.elem]
+    positions = {number: (x, y, z) for number, (x, y, z) in zip(numbers, places, strict=True)}
+    elements = [element for row in rows for element in _element(kinds.get(row[TYPE], 0), row[FIRST_NODE:])]
+    return StoredMesh(positions=positions, elements=elements)
+
+
+def _element(kind: int, nodes: list[int]) -> list[tuple[str, tuple[int, ...]]]:
+    """Give an element's shape and corners; what has collapsed to another shape names a corner twice."""
+    if kind in BARS:
+        return [(LINE, (nodes[0], nodes[1]))] if len(nodes) > 1 and nodes[1] else []
+    if kind in SHELLS:
+        shape = QUADRILATERAL if len(nodes) >= CORNERS[QUADRILATERAL] else TRIANGLE
+    elif kind in TETRAHEDRA or len(nodes) in {4, 10}:
+        shape = TETRAHEDRON
+    elif len(nodes) >= CORNERS[HEXAHEDRON]:
+        shape = HEXAHEDRON
+    else:
+        shape = {6: WEDGE, 5: PYRAMID, 3: TRIANGLE, 2: LINE}.get(len(nodes), "")
+    return [(shape, tuple(nodes[: CORNERS[shape]]))] if shape and len(nodes) >= CORNERS[shape] else []
+
+
+FORMAT = MeshFormat(rank=20, fits=lambda path, head: path.suffix.lower() == ".cdb", read=_read)  # noqa: ARG005
