@@ -154,6 +154,17 @@ def test_damaged_files_are_one_line(tmp_path, name, capsys):
     assert not any(capsys.readouterr())
 
 
+def test_a_damaged_archive_of_ansys_ends_its_reader_only(tmp_path):
+    """Its library writes beyond its memory where an element has more nodes than its row says."""
+    examples = pytest.importorskip("mapdl_archive.examples")
+    data = bytearray(Path(examples.hexarchivefile).read_bytes())
+    for place in range(len(data) // 2, len(data) // 2 + 4000, 97):
+        data[place : place + 1] = b"99999999"
+    (tmp_path / "a.cdb").write_bytes(data)
+    with pytest.raises(FileFormatError, match=r"a\.cdb"):
+        read_mesh(tmp_path / "a.cdb")
+
+
 def test_a_collapsed_brick_has_the_faces_of_a_wedge():
     faces = outer_faces([("hexahedron", (1, 2, 3, 3, 4, 5, 6, 6))])
     assert sorted(len(set(face)) for face in faces.tolist()) == [3, 3, 4, 4, 4]

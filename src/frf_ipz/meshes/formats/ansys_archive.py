@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
-from frf_ipz.foreign_errors import errors_of_reader, import_reader
-from frf_ipz.input_files import read_bytes
+import numpy as np
+
+from frf_ipz.foreign_errors import import_reader
 from frf_ipz.meshes.mesh_file import MOST_BYTES, MeshFormat, StoredMesh
 from frf_ipz.meshes.outer_faces import (
     CORNERS,
@@ -18,8 +18,12 @@ from frf_ipz.meshes.outer_faces import (
     TRIANGLE,
     WEDGE,
 )
-from frf_ipz.output_files import write_bytes
+from frf_ipz.reader_process import read_in_process
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PROCESS = "frf_ipz.meshes.ansys_archive_process"
 KIND = "an archive of Ansys"
 FIRST_NODE = 10  # of a row of an element; its material, type and so on stand before
 TYPE = 1
@@ -29,17 +33,20 @@ TETRAHEDRA = {72, 87, 92, 98, 123, 127, 148, 168, 187, 227, 232, 237, 285, 291}
 
 
 def _read(path: Path) -> StoredMesh:
-    mapdl = import_reader(path, "mapdl_archive", kind=KIND, extra="mesh")
-    with TemporaryDirectory() as folder, errors_of_reader(path, KIND):
-        copy = Path(folder) / "mesh.cdb"
-        write_bytes(copy, read_bytes(path, most_bytes=MOST_BYTES))
-        archive = mapdl.Archive(copy, parse_vtk=False)
-        numbers, places = archive.nnum.tolist(), archive.nodes[:, :3].tolist()
-        kinds = {int(number): int(kind) for number, kind in archive.ekey.tolist()}
-        rows = [row.tolist() for row in archive.elem]
-    positions = {number: (x, y, z) for number, (x, y, z) in zip(numbers, places, strict=True)}
-    elements = [element for row in rows for element in _element(kinds.get(row[TYPE], 0), row[FIRST_NODE:])]
-    return StoredMesh(positions=positions, elements=elements)
+    import_reader(path, "mapdl_archive", kind=KIND, extra="mesh")
+    arrays = read_in_process(path, PROCESS, kind=KIND, most_bytes=MOST_BYTES)
+    places = zip(arrays["nodes"].tolist(), arrays["positions"].tolist(), strict=True)
+    kinds = dict(arrays["kinds"].tolist())
+    rows = np.split(arrays["elements"], np.cumsum(arrays["sizes"])[:-1]) if len(arrays["sizes"]) else []
+    return StoredMesh(
+        positions={node: (x, y, z) for node, (x, y, z) in places},
+        elements=[
+            element
+            for row in rows
+            if len(row) > FIRST_NODE
+            for element in _element(kinds.get(int(row[TYPE]), 0), row[FIRST_NODE:].tolist())
+        ],
+    )
 
 
 def _element(kind: int, nodes: list[int]) -> list[tuple[str, tuple[int, ...]]]:

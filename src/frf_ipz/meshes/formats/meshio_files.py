@@ -5,14 +5,10 @@ It keeps no numbers of nodes: they are 1, 2, ... in the order of the file.
 
 from __future__ import annotations
 
-import io
-from contextlib import redirect_stderr, redirect_stdout
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING
 
 from frf_ipz.errors import FileFormatError
-from frf_ipz.foreign_errors import errors_of_reader, import_reader
+from frf_ipz.foreign_errors import import_reader
 from frf_ipz.input_files import read_bytes
 from frf_ipz.meshes.mesh_file import MOST_BYTES, MeshFormat, StoredMesh
 from frf_ipz.meshes.outer_faces import (
@@ -25,10 +21,15 @@ from frf_ipz.meshes.outer_faces import (
     TRIANGLE,
     WEDGE,
 )
-from frf_ipz.output_files import write_bytes
+from frf_ipz.reader_process import read_in_process
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PROCESS = "frf_ipz.meshes.meshio_process"
+LONGEST_S = 60.0  # a million nodes take a tenth of it
 KIND = "a mesh"
-SUFFIXES = {".vtk", ".vtu", ".msh", ".mesh", ".meshb", ".ply", ".off", ".su2", ".ugrid", ".avs", ".tec"}
+SUFFIXES = {".vtk", ".vtu", ".msh", ".mesh", ".meshb", ".su2", ".ugrid", ".avs"}
 SHAPES = {  # meshio's names without the number of nodes; corners stand before other nodes
     "line": LINE,
     "triangle": TRIANGLE,
@@ -41,36 +42,18 @@ SHAPES = {  # meshio's names without the number of nodes; corners stand before o
 
 
 def _read(path: Path) -> StoredMesh:
-    meshio = import_reader(path, "meshio", kind=KIND, extra="mesh")
-    data = read_bytes(path, most_bytes=MOST_BYTES)
-    if b"<!ENTITY" in data:
+    import_reader(path, "meshio", kind=KIND, extra="mesh")
+    if b"<!ENTITY" in read_bytes(path, most_bytes=MOST_BYTES):
         raise FileFormatError(path, "defines entities, which no mesh needs; export it again")
-    with TemporaryDirectory() as folder, errors_of_reader(path, KIND):
-        copy = Path(folder) / f"mesh{path.suffix.lower()}"
-        write_bytes(copy, data)
-        mesh = _silently(meshio, copy)
-        points = mesh.points
-        positions = {
-            number: (float(x), float(y), float(z))
-            for number, (x, y, z) in enumerate(((*row, 0.0, 0.0)[:3] for row in points.tolist()), start=1)
-        }
-        elements = [
-            (shape, tuple(node + 1 for node in nodes))
-            for block in mesh.cells
-            if (shape := SHAPES.get(block.type.rstrip("0123456789")))
-            for nodes in block.data[:, : CORNERS[shape]].tolist()
-        ]
+    arrays = read_in_process(path, PROCESS, kind=KIND, most_bytes=MOST_BYTES, longest_s=LONGEST_S)
+    positions = {node: (x, y, z) for node, (x, y, z) in enumerate(arrays["points"].tolist(), start=1)}
+    elements = [
+        (shape, tuple(node + 1 for node in nodes))
+        for name, block in arrays.items()
+        if (shape := SHAPES.get(name.partition(":")[2].rstrip("0123456789")))
+        for nodes in block[:, : CORNERS[shape]].tolist()
+    ]
     return StoredMesh(positions=positions, elements=elements)
-
-
-def _silently(meshio: Any, path: Path) -> Any:  # noqa: ANN401 - a mesh of meshio
-    """Read a file; what it prints before it ends the program is the reason that it cannot be read."""
-    said = io.StringIO()
-    try:
-        with redirect_stdout(said), redirect_stderr(said):
-            return meshio.read(path)
-    except SystemExit:
-        raise ValueError(said.getvalue().replace(str(path.parent), "")) from None
 
 
 FORMAT = MeshFormat(rank=20, fits=lambda path, head: path.suffix.lower() in SUFFIXES, read=_read)  # noqa: ARG005

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from functools import lru_cache
 from importlib.util import find_spec
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from scipy import sparse
 
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.matrices.stored import MOST_BYTES, MatrixFormat, MatrixRequest, StoredMatrix, both_triangles
-from frf_ipz.input_files import digest_file, read_bytes
-from frf_ipz.numpy_files import read_numpy
-from frf_ipz.output_files import write_bytes
+from frf_ipz.input_files import digest_file
+from frf_ipz.reader_process import read_in_process
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 LIBRARY = "ansys.mapdl.reader"
 PROCESS = "frf_ipz.fe.matrices.ansys_full_process"
 INTERNAL, MOST_LABELS = 10**12, 100  # numbers of DOFs that are no motions
-LONGEST_S = 600.0
-LAST_LETTERS = 200
 
 
 def _read(request: MatrixRequest) -> StoredMatrix:
@@ -59,18 +55,7 @@ def _is_installed() -> bool:
 def _arrays(path: Path, digest: str) -> Any:  # noqa: ANN401 - named arrays
     """Let another process read the file: a damaged one ends it."""
     del digest
-    with TemporaryDirectory() as folder:
-        copy, target = Path(folder) / "file.full", Path(folder) / "read.npz"
-        write_bytes(copy, read_bytes(path, most_bytes=MOST_BYTES))
-        command = [sys.executable, "-m", PROCESS, str(copy), str(target)]
-        try:
-            done = subprocess.run(command, capture_output=True, timeout=LONGEST_S, check=False)
-        except subprocess.TimeoutExpired:
-            raise FileFormatError(path, f"could not be read within {LONGEST_S:g} s; is it damaged?") from None
-        if done.returncode or not target.exists():
-            said = " ".join(done.stderr.decode("utf-8", "replace").split())[-LAST_LETTERS:]
-            raise FileFormatError(path, f"cannot be read as a .full file of Ansys: {said or 'it is damaged'}")
-        return read_numpy(target, only="", most_bytes=MOST_BYTES).arrays
+    return read_in_process(path, PROCESS, kind="a .full file of Ansys", most_bytes=MOST_BYTES)
 
 
 def _dofs(labels: Any) -> tuple[Dof, ...]:  # noqa: ANN401 - node and number of the DOF, from 0
