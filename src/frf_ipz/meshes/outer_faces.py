@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +24,7 @@ FACES = {  # places of corners: the base around, then the top around
 }
 SOLIDS = (TETRAHEDRON, PYRAMID, WEDGE, HEXAHEDRON)
 FEWEST, MOST = 3, 4  # corners of a face
+NO_FACES = np.zeros((0, MOST), np.int64)
 
 
 def outer_faces(elements: Iterable[tuple[str, Sequence[int]]]) -> IntArray:
@@ -49,23 +49,36 @@ def outer_faces(elements: Iterable[tuple[str, Sequence[int]]]) -> IntArray:
     >>> outer_faces([("triangle", (1, 2, 3))]).tolist()
     [[1, 2, 3, 3]]
     """
-    shells: dict[frozenset[int], tuple[int, ...]] = {}
-    solids: dict[frozenset[int], tuple[int, ...]] = {}
-    count: Counter[frozenset[int]] = Counter()
+    by_shape: dict[str, list[Sequence[int]]] = {}
     for shape, corners in elements:
+        by_shape.setdefault(shape, []).append(corners)
+    solids, shells = [NO_FACES], [NO_FACES]
+    for shape, rows in by_shape.items():
+        table = np.array(rows, np.int64)
         for places in FACES.get(shape, ()):
-            around = tuple(dict.fromkeys(corners[place] for place in places))
-            if len(around) < FEWEST:
-                continue
-            key = frozenset(around)
-            if shape in SOLIDS:
-                solids[key] = around
-                count[key] += 1
-            else:
-                shells[key] = around
-    seen = {**{key: around for key, around in solids.items() if count[key] == 1}, **shells}
-    faces = [(*around, *around[-1:] * (MOST - len(around))) for around in seen.values()]
-    return np.array(faces, np.int64).reshape(-1, MOST)
+            around = table[:, [*places, *places[-1:] * (MOST - len(places))]]
+            (solids if shape in SOLIDS else shells).append(around)
+    faces, counts = _distinct(np.concatenate(solids))
+    return _distinct(np.concatenate([faces[counts == 1], *shells]))[0]
+
+
+def _distinct(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Give each face once, its corners around, and how often it stands there; those of two corners are none."""
+    ascending = np.sort(faces, axis=1)
+    is_again = np.diff(ascending, axis=1, prepend=-1) == 0
+    keys = np.sort(np.where(is_again, np.iinfo(np.int64).max, ascending), axis=1)
+    has_area = is_again.sum(axis=1) <= MOST - FEWEST
+    _, first, counts = np.unique(keys[has_area], axis=0, return_index=True, return_counts=True)
+    return _triangles_last(faces[has_area][first]), counts
+
+
+def _triangles_last(faces: IntArray) -> IntArray:
+    """Turn triangles so that the corner that stands there twice is the last one."""
+    turned = faces.copy()
+    for place in range(MOST):  # twice at this place and the next one
+        is_twice = (faces[:, place] == faces[:, (place + 1) % MOST])[:, None]
+        turned = np.where(is_twice, np.roll(faces, 2 - place, axis=1), turned)
+    return turned
 
 
 def edges_of(faces: IntArray, lines: Iterable[tuple[int, int]]) -> IntArray:

@@ -168,3 +168,9 @@ def test_a_damaged_archive_of_ansys_ends_its_reader_only(tmp_path):
 def test_a_collapsed_brick_has_the_faces_of_a_wedge():
     faces = outer_faces([("hexahedron", (1, 2, 3, 3, 4, 5, 6, 6))])
     assert sorted(len(set(face)) for face in faces.tolist()) == [3, 3, 4, 4, 4]
+
+
+def test_a_collapsed_quadrilateral_is_a_triangle_whose_last_corner_stands_there_twice():
+    corners = [(1, 1, 2, 3), (4, 5, 6, 4), (7, 8, 8, 9), (7, 7, 8, 8)]
+    faces = outer_faces([("quadrilateral", nodes) for nodes in corners])
+    assert faces.tolist() == [[2, 3, 1, 1], [5, 6, 4, 4], [9, 7, 8, 8]]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 PROCESS = "frf_ipz.meshes.meshio_process"
-LONGEST_S = 60.0  # a million nodes take a tenth of it
+LONGEST_S = 60.0  # a million nodes take 8
 KIND = "a mesh"
 SUFFIXES = {".vtk", ".vtu", ".msh", ".mesh", ".meshb", ".su2", ".ugrid", ".avs"}
 SHAPES = {  # meshio's names without the number of nodes; corners stand before other nodes
