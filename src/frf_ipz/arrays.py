@@ -46,6 +46,31 @@ def read_only(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
     return view
 
 
+def complex_array(real: npt.ArrayLike, imag: npt.ArrayLike) -> ComplexArray:
+    """Put real and imaginary parts together, each as it is.
+
+    A product with the imaginary unit would make NaN of the real part where the imaginary one is infinite.
+
+    Parameters
+    ----------
+    real, imag : array
+        Of shapes that go together.
+
+    Returns
+    -------
+    complex array
+        Of their common shape.
+
+    Examples
+    --------
+    >>> complex_array([1.0, 2.0], [np.inf, 0.0]).real
+    array([1., 2.])
+    """
+    values = np.empty(np.broadcast_shapes(np.shape(real), np.shape(imag)), np.complex128)
+    values.real, values.imag = real, imag
+    return values
+
+
 def require_shape(name: str, array: npt.NDArray[Scalar], shape: Sequence[int | None]) -> None:
     """Refuse an array that does not have the required shape.
 

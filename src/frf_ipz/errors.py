@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
+MOST_LETTERS = 800  # of a problem, of which the end says what to do; a damaged file may have a name of any length
+
+
 class FrfIpzError(Exception):
     """Any error that frf_ipz raises on purpose.
 
@@ -106,7 +109,13 @@ class FileFormatError(InputError):
     def __init__(self, path: Path | str, problem: str, *, where: str = "") -> None:
         self.path = path
         self.where = where
-        super().__init__(f"{path}{f', {where}' if where else ''}: {problem}")
+        where = _without_middle(where, MOST_LETTERS // 8)
+        super().__init__(f"{path}{f', {where}' if where else ''}: {_without_middle(problem, MOST_LETTERS)}")
+
+
+def _without_middle(text: str, most: int) -> str:
+    """Leave out what lies in the middle of a text that is too long."""
+    return text if len(text) <= most else f"{text[: most // 2 - 3]} ... {text[2 - most // 2 :]}"
 
 
 class NoModesError(InputError):

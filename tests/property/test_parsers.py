@@ -480,6 +480,8 @@ def test_whatever_a_longer_search_finds_is_read_or_refused(name):
 
 
 FOUND = [  # by a longer search
+    ("frf.uff", (0.7, 12, b"inf")),
+    ("frf.uff", (0.05, 0, 2000 * b" x")),
     ("recording.uff", (0.26953125, 0, b"\n")),
     ("frf.csv", (0.0, 0, b"0;")),
     ("frf.csv", (0.5700660287258991, 14, b"1e300")),
@@ -491,3 +493,4 @@ def test_what_a_longer_search_has_found_is_refused(name, change):
     refusal = refusal_of(name, edited(PARSERS[name][0].encode(), [change]))
     assert refusal is not None
     assert name in refusal
+    assert len(refusal) < LONGEST

@@ -52,6 +52,7 @@ ROWS_AT_ONCE = 4096
 ROWS_OF_A_TILE = 128  # when a matrix is mirrored: both tiles stay in the cache
 ALIKE = 1e-4  # relative, of the noise of each datum: none is known as well
 LARGEST_SHARES = 1e3  # in a mixture: what rounding may grow by
+OF_PRIOR = 1e-2  # of its information: what rounding may take of it
 UNTOLD = 1e-4  # of the prior's information: a deviation that so few data narrow is the prior's to four digits
 
 
@@ -100,6 +101,8 @@ class Linearised:
         The data of each block.
     slack : (n,) array
         The units.
+    rounding : (n,) array
+        Variance that each datum got besides, since double precision cannot tell less of it from none.
     sums : list of pair of (n,) and (c + k + 1, c + k + 1) array
         Weights of the data, and the sums of products of sensitivity and data with them, as far as they are known.
     """
@@ -111,6 +114,7 @@ class Linearised:
     axes: tuple[FloatArray, ...]
     places: tuple[IntArray, ...]
     slack: FloatArray
+    rounding: FloatArray
     sums: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
 
     @property
@@ -352,6 +356,10 @@ def linearise(
         The same data.
     """
     units = np.ones(len(data)) if slack is None else slack
+    pieces = [noise.common, *parts]
+    rounding = _rounding(noise, pieces[1:], np.ones(len(pieces)) if scales is None else scales)
+    if rounding.any():
+        noise = noise.plus(rounding)
     levels, axes, places = [], [], []
     for part, block in noise.parts():
         values, vectors = np.linalg.eigh(block / np.outer(units[part], units[part]))
@@ -360,7 +368,6 @@ def linearise(
         places.append(part)
     turned = tuple(axes), tuple(places), units
     level = np.concatenate(levels) if levels else np.zeros(0)
-    pieces = [noise.common, *parts]
     ends = tuple(np.cumsum([piece.shape[1] for piece in pieces]).tolist())
     joined = _rotated(*turned, *pieces, data[:, None])
     del pieces  # large
@@ -389,8 +396,25 @@ def linearise(
         axes=turned[0],
         places=turned[1],
         slack=units,
+        rounding=rounding,
         sums=sums,
     )
+
+
+def _rounding(noise: TargetNoise, parts: Sequence[FloatArray], stds: FloatArray) -> FloatArray:
+    """Give the variance that data need for their information, and the prior's, to have a sum in double precision.
+
+    A target that runs off for the least change of a parameter, as a zero does that meets another, would be known better
+    than the prior has it by more decades than a number has. It tells no less with a little more noise.
+    """
+    spread = np.sum(noise.common**2, axis=1)
+    for part, std in zip(parts, stds, strict=False):
+        spread += std**2 * np.einsum("ij,ij->i", part, part)
+    own = np.zeros(len(spread))
+    for place, block in noise.parts():
+        own[place] = np.diagonal(block)
+    least = spread * len(spread) * np.finfo(float).eps / OF_PRIOR
+    return np.where(least > own, least, 0.0)
 
 
 def with_more_noise(linear: Linearised, noise: TargetNoise, datum: int) -> Linearised:
@@ -415,6 +439,7 @@ def with_more_noise(linear: Linearised, noise: TargetNoise, datum: int) -> Linea
         (rows, vectors, place, block) for (rows, place, vectors), (_, block) in blocks if datum in place
     )
     units = linear.slack[place]
+    block = block + np.diag(linear.rounding[place])
     values, new_vectors = np.linalg.eigh(block / np.outer(units, units))
     joined = linear.joined.copy()
     joined[rows] = new_vectors.T @ vectors @ linear.joined[rows]

@@ -156,6 +156,18 @@ def test_balanced_truncation_of_the_rest_keeps_the_elastic_modes():
     assert hankel[0] < 1e-2  # m/N: of the elastic modes; a pole of 1e-5 rad/s has one beyond 1e3
 
 
+@pytest.mark.parametrize("order", [8, 12])
+def test_balred_keeps_rigid_body_modes_and_reduces_the_rest(order):
+    pytest.importorskip("slycot")
+    _, space = exported(beam(), ["21:z", "3:z"], ["1:z", "11:z"])
+    system = to_control(space)
+    reduced = control.balred(system, order)
+    assert reduced.nstates == order
+    assert np.count_nonzero(np.abs(reduced.poles()) < 1e-6) == 4
+    s = 2j * np.pi * np.linspace(30.0, 500.0, 200)
+    assert np.linalg.norm(reduced(s) - system(s)) < 0.1 * np.linalg.norm(system(s))
+
+
 def test_what_no_port_drives_or_sees_is_left_out():
     """Two free chains that nothing joins: ports on one of them."""
     first, second = SPRINGS_N_M

@@ -264,3 +264,22 @@ def test_more_noise_of_a_datum_is_that_of_its_block(many):
         first, second = (solve_step(linear, np.ones(1), factor) for linear in (changed, again))
         assert_allclose(first.mean, second.mean, rtol=1e-9)
         assert_allclose(first.misfit, second.misfit, rtol=1e-9)
+
+
+def test_a_target_that_runs_off_leaves_the_others_their_information():
+    """As a zero does that is about to meet another: its slope has no bound, and its square no place in a number."""
+    rng = np.random.default_rng(5)
+    sensitivity = 0.1 * rng.standard_normal((40, 60))
+    sensitivity[0] *= 1e4
+    noise = TargetNoise(common=np.zeros((40, 0)), blocks=(1e-12 * np.eye(40),))
+    others = TargetNoise(common=np.zeros((39, 0)), blocks=(1e-12 * np.eye(39),))
+    data = sensitivity @ rng.standard_normal(60)
+    linear = linearise([sensitivity], data, noise)
+    root, _ = linear.information(np.ones(1), 0.0)
+    assert np.isfinite(root).all()
+    without = linearise([sensitivity[1:]], data[1:], others)
+    assert not without.rounding.any()
+    assert set(np.flatnonzero(linear.rounding)) == {0}
+    assert linear.rounding[0] < 1e-6 * np.sum(sensitivity[0] ** 2)
+    changed = with_more_noise(linear, noise.plus(0.01 * (np.arange(40) == 3)), 3)
+    assert np.isfinite(changed.information(np.ones(1), 0.0)[0]).all()

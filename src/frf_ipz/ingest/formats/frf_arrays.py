@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arrays import complex_array
 from frf_ipz.dofs import AnyDof, Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean
 from frf_ipz.ingest.formats.file_arrays import FileArrays, describe, last_part
@@ -211,7 +212,7 @@ def _complex_values(arrays: FileArrays, given: Mapping[str, NumericArray]) -> Co
         problem = f"'variables' names {', '.join(sorted(parts))}; needed is frf, or real and imag, or a magnitude and a"
         raise FileFormatError(arrays.path, f"{problem} phase, of one shape")
     if parts == {"real", "imag"}:
-        return np.asarray(given["real"] + 1j * given["imag"], np.complex128)
+        return complex_array(given["real"], given["imag"])
     magnitude = given["magnitude"] if "magnitude" in given else 10.0 ** (given["magnitude_db"] / 20.0)
     phase = given["phase_rad"] if "phase_rad" in given else np.radians(given["phase_deg"])
     return np.asarray(magnitude * np.exp(1j * phase), np.complex128)
@@ -354,7 +355,7 @@ def _complex_arrays(arrays: FileArrays) -> list[tuple[str, ComplexArray]]:
         match = re.fullmatch(r"(.*?)(real|re)", name, re.IGNORECASE)
         other = None if match is None else arrays.find(match[1] + {"real": "imag", "re": "im"}[match[2].lower()])
         if match and other and array.shape == arrays.arrays[other].shape and array.size > 1:
-            found.append((name, np.asarray(array + 1j * arrays.arrays[other], np.complex128)))
+            found.append((name, complex_array(array, arrays.arrays[other])))
     return found or _columns_of_parts(arrays)
 
 
@@ -368,7 +369,7 @@ def _joined_columns(array: NumericArray) -> ComplexArray | None:
     """Join two real columns, real and imaginary part; None where they are others, or frequencies and a value."""
     if array.ndim != 2 or array.shape[1] != 2 or len(array) < FEWEST_LINES or np.iscomplexobj(array):
         return None
-    return None if (np.diff(array[:, 0]) > 0).all() else np.asarray(array[:, 0] + 1j * array[:, 1], np.complex128)
+    return None if (np.diff(array[:, 0]) > 0).all() else complex_array(array[:, 0], array[:, 1])
 
 
 def _find_frequencies(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyarrow as pa
 
+from frf_ipz.arrays import complex_array
 from frf_ipz.dofs import AnyDof, parse_label
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
@@ -87,7 +88,7 @@ def _make_frf(source: FrfSource, output_dof: AnyDof, input_dof: AnyDof, columns:
         output_dof=output_dof,
         input_dof=input_dof,
         frequency_hz=columns["frequency_hz"][order],
-        values=columns["real"][order] + 1j * columns["imag"][order],
+        values=complex_array(columns["real"][order], columns["imag"][order]),
         coherence=columns["coherence"][order] if "coherence" in columns else None,
         variance=columns["variance"][order] if "variance" in columns else None,
         notes=note_at_rest(source, output_dof, input_dof, left_out),

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pyarrow as pa
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray, complex_array
 from frf_ipz.errors import FileFormatError, did_you_mean
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import COMMENT, NEWLINE, TextLayout, decode, name_and_unit, open_text, sniff
@@ -168,7 +168,7 @@ def stated_frequency_unit(layout: TextLayout, index: int) -> str:
 
 def _complex_values(columns: dict[str, FloatArray]) -> ComplexArray:
     if "real" in columns:
-        return np.asarray(columns["real"] + 1j * columns["imag"])
+        return complex_array(columns["real"], columns["imag"])
     phase = columns["phase_rad"] if "phase_rad" in columns else np.radians(columns["phase_deg"])
     magnitude = columns["magnitude"] if "magnitude" in columns else 10.0 ** (columns["magnitude_db"] / 20.0)
     return np.asarray(magnitude * np.exp(1j * phase))

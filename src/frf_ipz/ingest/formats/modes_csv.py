@@ -118,7 +118,7 @@ def _shapes(
         if not np.isnan(shapes[places[dof], mode]):
             where = f"line {line_of_row(layout, row)}"
             raise FileFormatError(layout.path, f"mode {numbers[mode]:g} has '{dof}' twice", where=where)
-        shapes[places[dof], mode] = columns["real"][row] + 1j * columns["imag"][row]
+        shapes[places[dof], mode] = complex(columns["real"][row], columns["imag"][row])
     missing = np.argwhere(np.isnan(shapes))
     if len(missing):
         dof, mode = missing[0]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arrays import complex_array
 from frf_ipz.dofs import DIRECTIONS, Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats.modes_file import ModesSource, make_modes
@@ -129,7 +130,9 @@ def _read_shape(data: DataSet) -> _Shape:
         n_real = data.integers(at + 1, 10, 2, "the counts of a data set 55")[1]
         frequency_hz, ratio = _read_pole(data, at + 2, analysis, n_real)
         motions = _read_motions(data, at + 3 + max(0, -(-n_real // PER_LINE) - 1), n_numbers)
-    values = {node: row[::2] + 1j * row[1::2] if is_complex else row.astype(complex) for node, row in motions.items()}
+    values = {
+        node: complex_array(row[::2], row[1::2]) if is_complex else row.astype(complex) for node, row in motions.items()
+    }
     return _Shape(frequency_hz=frequency_hz, ratio=ratio, values=values)
 
 

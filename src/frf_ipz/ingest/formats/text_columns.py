@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
 EVEN = 0.02  # of the step between printed times: twice what the contract allows, since digits are rounded
+LETTERS_SHOWN, NAMES_SHOWN = 40, 10  # of names of columns, in a message
 FEWEST_ROWS = 3  # two steps can be compared
 DAY_S = 86400.0
 TIME = re.compile(
@@ -114,12 +115,14 @@ def no_time(layout: TextLayout, found: TextColumns) -> FileFormatError:
     FileFormatError
         Says what to write.
     """
-    names = ", ".join(f"'{name}'" for name in found.names if name)
-    first = f"the first column '{found.names[0]}'" if found.names[0] else "the first column"
+    first_name, *_ = names = [name[:LETTERS_SHOWN] for name in found.names]
+    listed = [f"'{name}'" for name in names if name]
+    shown = ", ".join([*listed[:NAMES_SHOWN], *(["..."] if len(listed) > NAMES_SHOWN else [])])
+    first = f"the first column '{first_name}'" if first_name else "the first column"
     behaves = "counts the samples" if found.counts_samples else "does not grow by equal steps"
     problem = (
         f"has no column 'time', and {first} {behaves}; write sample_rate_hz = ... under [test], or time_column = ... "
-        f"where another one is the time: {names}"
+        f"where another one is the time: {shown}"
     )
     return FileFormatError(layout.path, problem, where=f"line {max(layout.n_before, 1)}")
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arrays import complex_array
 from frf_ipz.dofs import DIRECTIONS, Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.text_numbers import NumberError, parse_numbers
@@ -257,7 +258,7 @@ def _read_function(lines: _Lines, number: int, kind: str, units: tuple[float, fl
         ordinate=ordinate,
         denominator=denominator,
         x=np.asarray(x, np.float64),
-        values=np.asarray(columns[:, 0] + (1j * columns[:, 1] if parts == 2 else 0.0), np.complex128),
+        values=complex_array(columns[:, 0], columns[:, 1] if parts == 2 else 0.0),
         units=units,
     )
 
