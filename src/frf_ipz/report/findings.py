@@ -101,4 +101,5 @@ def card_texts(diagnosis: Diagnosis) -> tuple[str, str]:
             "nothing",
             "but damping, which is as measured" if diagnosis.statements else "within the stated tolerances",
         )
-    return names, confidence(min(finding.probability for finding in diagnosis.findings))
+    damping = "; damping is as measured" if diagnosis.statements else ""
+    return names, confidence(min(finding.probability for finding in diagnosis.findings)) + damping
