@@ -71,7 +71,8 @@ def chain(
     if model is not None and is_diagnosing and options.apply:
         diagnosis = mismatch.diagnose(runner, model, frfs, is_asked=is_asked)
         model, frfs = mismatch.apply_diagnosis(runner, model, frfs, diagnosis)
-    fit = measurement.fit(runner, frfs, modes=recordings.modes, corrected_by=diagnosis)
+    with hints.naming_exchanged_columns(inputs, recordings):
+        fit = measurement.fit(runner, frfs, modes=recordings.modes, corrected_by=diagnosis)
     if inputs.test.has_frf_levels:
         mismatch.levels(runner, fit, recordings.frfs)
     outputs.files(runner, fit, frfs)

@@ -3,9 +3,9 @@
 import pytest
 
 import frf_ipz
-from frf_ipz.errors import InputError, NumericalError
+from frf_ipz.errors import InputError, NoModesError, NumericalError
 from frf_ipz.pipeline.inputs import read_inputs
-from frf_ipz.pipeline.stages.hints import naming_the_cause
+from frf_ipz.pipeline.stages.hints import naming_exchanged_columns, naming_the_cause
 from small_campaign import write_campaign
 
 
@@ -37,3 +37,26 @@ def test_a_wrong_unit_of_the_model_is_an_error_of_the_input(tmp_path):
 def test_without_a_likely_cause_the_error_stays_what_it_is(tmp_path):
     with pytest.raises(NumericalError, match=r"^the numbers have no end$"):
         fail_with(tmp_path, lambda text: text)
+
+
+def fail_to_fit(folder, change):
+    """Let the fit of a small campaign fail, whose test was changed."""
+    pipeline = write_campaign(folder)
+    test = folder / "test.toml"
+    test.write_text(change(test.read_text()))
+    inputs = read_inputs(pipeline)
+    with naming_exchanged_columns(inputs, frf_ipz.estimate_frfs(inputs.test)):
+        raise NoModesError("no mode stands out")
+
+
+def test_exchanged_columns_are_named_where_nothing_can_be_fitted(tmp_path):
+    def exchange(text):
+        return text.replace('"force"', '"other"', 1).replace('"acc"', '"force"', 1).replace('"other"', '"acc"', 1)
+
+    with pytest.raises(InputError, match=r"no mode stands out; most likely the columns .* are exchanged"):
+        fail_to_fit(tmp_path, exchange)
+
+
+def test_a_fit_that_fails_for_other_reasons_says_only_that(tmp_path):
+    with pytest.raises(NoModesError, match=r"^no mode stands out$"):
+        fail_to_fit(tmp_path, lambda text: text)

@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from frf_ipz.assessment.assess import likely_cause
-from frf_ipz.errors import InputError, NumericalError
+from frf_ipz.assessment.causes.columns import find_exchanged_columns
+from frf_ipz.errors import InputError, NoModesError, NumericalError
 
 if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit
@@ -54,6 +55,38 @@ def naming_the_cause(
             impacts=impacts,
             **inputs.places_of_mistakes,
         )
+        if cause is None:
+            raise
+        raise InputError(f"{inputs.source}: {error}; most likely {cause.says} ({cause.place})") from error
+
+
+@contextmanager
+def naming_exchanged_columns(inputs: PipelineInputs, recordings: FrfEstimate) -> Iterator[None]:
+    """Say that force and response are exchanged where that leaves nothing to fit.
+
+    Parameters
+    ----------
+    inputs : PipelineInputs
+        What is worked on.
+    recordings : FrfEstimate
+        FRFs and recordings.
+
+    Yields
+    ------
+    None
+        While the FRFs are fitted.
+
+    Raises
+    ------
+    InputError
+        Where the columns are exchanged; else the error of the fit goes on.
+    """
+    try:
+        yield
+    except (NoModesError, NumericalError) as error:
+        impacts = recordings.traces if inputs.test.kind == "hammer" else ()
+        test_file = inputs.places_of_mistakes["test_file"]
+        cause = find_exchanged_columns(impacts, recordings.frfs.labels, test_file=test_file)
         if cause is None:
             raise
         raise InputError(f"{inputs.source}: {error}; most likely {cause.says} ({cause.place})") from error
