@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import openpyxl
 import pytest
+import pyuff
 import scipy.io
 from scipy.io import wavfile
 
@@ -197,6 +198,25 @@ def test_frfs_in_any_format(tmp_path, name, write, n_frfs):
     np.testing.assert_allclose(frfs.values[:, 0], FRF, rtol=1e-10)
     if n_frfs == 1:
         assert str(test.labels[0]) == "21:+z / 15:+z"
+
+
+def test_the_geometry_of_a_universal_file_is_drawn_without_a_model(tmp_path):
+    """FRFs, nodes and trace lines in one file, as analysers export them."""
+    nodes = {"type": 15, "node_nums": [15, 21], "def_cs": [0, 0], "disp_cs": [0, 0], "color": [1, 1]}
+    trace = {"type": 82, "trace_num": 1, "n_nodes": 2, "color": 1, "id": "frame", "nodes": np.array([15, 21])}
+    pyuff.UFF(str(tmp_path / "a.unv")).write_sets(
+        [nodes | {"x": [0.0, 0.3], "y": [0.0, 0.4], "z": [0.0, 0.1]}, trace], "overwrite"
+    )
+    write_frf_uff(tmp_path / "b.unv")
+    (tmp_path / "a.unv").write_text((tmp_path / "a.unv").read_text() + (tmp_path / "b.unv").read_text())
+    (tmp_path / "b.unv").unlink()
+    starting = write_starting_files(tmp_path)
+    assert "a.unv: where the nodes are, for drawings" in starting.taken_for
+    test = read_test(tmp_path / "test.toml")
+    assert str(test.labels[0]) == "21:+z / 15:+z"
+    results = frf_ipz.run_pipeline(tmp_path / "pipeline.toml", tmp_path / "out", until="fit")
+    np.testing.assert_allclose(results.geometry.coordinates_m, [[0, 0, 0], [0.3, 0.4, 0.1]])
+    assert results.geometry.mesh.lines.tolist() == [[15, 21]]
 
 
 def test_frfs_without_a_header_are_guessed_and_their_single_numbers_are_those_of_a_roving_hammer(tmp_path):

@@ -25,6 +25,7 @@ from frf_ipz.ingest.formats.recording import TableKeys
 from frf_ipz.ingest.units import numerator_of
 from frf_ipz.modes import ModalParameters
 from frf_ipz.quantities import RESPONSES, frf_quantity_of
+from frf_ipz.structure import Geometry
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -316,6 +317,10 @@ class VibrationTest(Concise):
     particulars : mapping of str to str
         Who measured, when, with what, for whom, and which machine: ``operator``, ``date``, ``equipment``,
         ``customer``, ``serial_number``, as far as they are stated.
+    geometry_path : Path, optional
+        File of `geometry`.
+    geometry : Geometry, optional
+        Where the nodes are, for drawings where there is no FE model.
 
     Examples
     --------
@@ -353,6 +358,8 @@ class VibrationTest(Concise):
     modes_path: Path | None = None
     modes: ModalParameters | None = field(default=None, repr=False)
     particulars: Mapping[str, str] = field(default_factory=dict, repr=False)
+    geometry_path: Path | None = field(default=None, repr=False)
+    geometry: Geometry | None = field(default=None, repr=False)
 
     @classmethod
     def from_recordings(

@@ -28,6 +28,7 @@ from frf_ipz.ingest.formats.recording import TableKeys
 from frf_ipz.ingest.formats.registry import read_frf_file, read_modes_file
 from frf_ipz.ingest.formats.transmissibility import no_reference
 from frf_ipz.ingest.units import sensitivity_factor, unit_factor
+from frf_ipz.meshes.registry import read_mesh
 from frf_ipz.option_types import Count, CountOrNone, Day, NotNegative, Positive, Ratio
 from frf_ipz.quantities import RECIPROCALS, FrfQuantity
 from frf_ipz.toml_files import STRICT, read_toml
@@ -76,6 +77,9 @@ class TestKeys:
         What it was measured with, and for whom.
     serial_number : str
         Of the machine that was measured.
+    geometry : str
+        File with the measured nodes and the lines or elements between them, for drawings where there is no FE model:
+        any that ``[matrices] nodes`` takes, such as a universal file.
     """
 
     __pydantic_config__ = STRICT
@@ -93,6 +97,7 @@ class TestKeys:
     equipment: str = ""
     customer: str = ""
     serial_number: str = ""
+    geometry: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -356,6 +361,7 @@ def read_test(path: str | Path) -> VibrationTest:
     modes_source = next((_read_modes_source(path, entry) for entry in keys.modes), None)
     modes = None if modes_source is None else read_modes_file(modes_source)
     labels += [] if modes is None else modes.labels
+    geometry_path = path.parent / keys.test.geometry if keys.test.geometry else None
     return VibrationTest(
         path=path,
         name=keys.test.name or path.parent.name,
@@ -373,6 +379,8 @@ def read_test(path: str | Path) -> VibrationTest:
         frf_sources=sources,
         modes_path=None if modes_source is None else modes_source.path,
         modes=modes,
+        geometry_path=geometry_path,
+        geometry=None if geometry_path is None else read_mesh(geometry_path).geometry(),
         particulars={name: text for name in PARTICULARS if (text := getattr(keys.test, name).strip())},
         labels=tuple(dict.fromkeys(labels)),
     )

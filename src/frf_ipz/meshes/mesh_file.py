@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.meshes.outer_faces import LINE, edges_of, outer_faces
-from frf_ipz.structure import Mesh
+from frf_ipz.structure import Geometry, Mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -56,6 +56,20 @@ class StoredMesh:
         nodes = np.unique(np.concatenate([faces.ravel(), lines.ravel()]))
         places = np.array([self.positions[node] for node in nodes.tolist()], float).reshape(-1, 3)
         return Mesh(nodes=nodes, coordinates_m=(self.unit_m or unit_m) * places, lines=lines, faces=faces)
+
+    def geometry(self) -> Geometry:
+        """Give nodes with what is drawn between them; where the file does not say its unit, it is m.
+
+        Returns
+        -------
+        Geometry
+            All nodes.
+        """
+        mesh = self.drawn()
+        nodes = np.array(sorted(self.positions), np.int64)
+        places = np.array([self.positions[node] for node in nodes.tolist()], float).reshape(-1, 3)
+        lines = np.zeros((0, 2), np.int64) if mesh is None else mesh.lines
+        return Geometry(nodes=nodes, coordinates_m=(self.unit_m or 1.0) * places, lines=lines, mesh=mesh)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -152,7 +152,8 @@ def _read_inputs(path: Path, ledger: Ledger, shared: SharedModel | None) -> Pipe
     effects = (file for file in pipeline.file.diagnose.effect_files(pipeline.path.parent) if file.is_file())
     files_of_model = (*files_of_model, *effects)
     aside = pipeline.reference_path
-    files = [pipeline.path, pipeline.test_path, *test.files, *files_of_model, *([] if aside is None else [aside])]
+    further = [file for file in (aside, test.geometry_path) if file is not None]
+    files = [pipeline.path, pipeline.test_path, *test.files, *files_of_model, *further]
     return PipelineInputs(
         name=pipeline.name,
         source=str(pipeline.path),

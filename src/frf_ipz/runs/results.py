@@ -246,7 +246,7 @@ class Results:
 
     @cached_property
     def geometry(self) -> Geometry | None:
-        """Where the nodes of the FE model are."""
+        """Where the nodes of the FE model are; without one, those of the test, where it says so."""
         model = self._load("model")
         return model.geometry if isinstance(model, StructuralModel) else model
 

@@ -188,7 +188,7 @@ def dof_forms(run: Results, choices: PipelineFile, retained: Sequence[AnyDof]) -
         template="show/dof_forms.html",
         data={
             "direction": next((label.output_dof.direction for label in run.labels), "z"),
-            "has_model": run.geometry is not None,
+            "has_model": choices.pipeline.model is not None or run.reduced_model is not None,
             "retained": " ".join([dof.name for dof in retained] or choices.reduce.dofs),
         },
     )

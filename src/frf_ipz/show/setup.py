@@ -33,7 +33,7 @@ def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[
     Returns
     -------
     run : Results
-        The name, and the geometry where there is a model.
+        The name, and the geometry where the model or the test has one.
     section : Section
         What was read; or what is wrong with it.
     """
@@ -44,7 +44,7 @@ def read_setup(pipeline: Path, read: Callable[[Path], PipelineInputs]) -> tuple[
         notes = (str(error), "Correct the file, then load this page again.")
         lead = "This pipeline cannot be run as it stands."
         return _results_of(pipeline.stem), Section(anchor=anchor, title=title, lead=lead, blocks=(), notes=notes)
-    run = _results_of(inputs.name, None if inputs.fe_model is None else inputs.fe_model.geometry)
+    run = _results_of(inputs.name, inputs.test.geometry if inputs.fe_model is None else inputs.fe_model.geometry)
     marks = StructureMarks(sensors=inputs.test.output_dofs, inputs=inputs.test.input_dofs, points=inputs.points)
     drawing = describe_structure(run.geometry, marks)
     lead = "Nothing has been run yet. This is what the files say; 'Run' above starts the computation."

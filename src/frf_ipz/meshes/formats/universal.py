@@ -9,6 +9,8 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from frf_ipz.errors import FileFormatError
+from frf_ipz.input_files import open_input
 from frf_ipz.meshes.mesh_file import MeshFormat, StoredMesh
 from frf_ipz.meshes.outer_faces import HEXAHEDRON, LINE, QUADRILATERAL, TETRAHEDRON, TRIANGLE, WEDGE
 from frf_ipz.text_numbers import NumberError, parse_numbers
@@ -27,6 +29,7 @@ ELEMENTS = {"780": 8, "2412": 6}  # integers in the first line of an element, th
 KINDS = {UNITS, SINGLE_NODES, *DOUBLE_NODES, TRACE_LINES, *ELEMENTS}
 ADVICE = "export the geometry again"
 PER_LINE = 8  # nodes
+HEAD_BYTES = 4096
 N_TOKENS = 7  # of a node in single precision
 BEAMS = (11, 21, 22, 23, 24)  # elements with a line of their cross-sections
 LINES = (*BEAMS, 31, 32, 121, 136, 137, 138, 139, 141)
@@ -83,7 +86,12 @@ def holds_geometry(path: Path) -> bool:
     bool
         True where it is; what is damaged in it is said where it is read.
     """
-    kinds = {data.kind for data in read_data_sets(path, KINDS, advice=ADVICE)}
+    try:
+        with open_input(path) as stream:
+            is_known = is_universal(stream.read(HEAD_BYTES))
+        kinds = {data.kind for data in read_data_sets(path, KINDS, advice=ADVICE)} if is_known else set()
+    except FileFormatError:
+        return False
     return bool(kinds & {SINGLE_NODES, *DOUBLE_NODES}) and bool(kinds & {TRACE_LINES, *ELEMENTS})
 
 

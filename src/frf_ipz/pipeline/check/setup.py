@@ -46,8 +46,10 @@ def describe_setup(inputs: PipelineInputs) -> str:
     """
     test = inputs.test
     lines = [inputs.name, ""]
+    geometry = test.geometry if inputs.fe_model is None else inputs.fe_model.geometry
+    if geometry is not None:
+        lines += [*draw(geometry, test.output_dofs, test.input_dofs, inputs.points), ""]
     if inputs.fe_model is not None:
-        lines += [*draw(inputs.fe_model.geometry, test.output_dofs, test.input_dofs, inputs.points), ""]
         lines += look_at_model(inputs.fe_model).lines
     lines.append(f"test        {test.name} ({test.kind}), {counted(len(test.files), 'file')}")
     files = RecordingFiles(test=test)

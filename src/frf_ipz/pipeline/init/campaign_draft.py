@@ -52,10 +52,12 @@ def draft_test(contents: FolderContents, places: Places) -> str:
 
 
 def _head(contents: FolderContents) -> list[str]:
+    geometry = [] if contents.geometry is None else [f"geometry = {quoted(contents.name(contents.geometry))}"]
     return [
         HEAD,
         "[test]",
         f"name = {quoted(contents.folder.resolve().name)}",
+        *geometry,
         with_comment('# operator = "A. Meier"', "and date, equipment, customer, serial_number: shown on the page"),
         with_comment("# nominal_damping_ratio = 0.001", "where the model states none"),
     ]

@@ -12,6 +12,7 @@ from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.formats.modes_uff import holds_shapes
 from frf_ipz.ingest.formats.registry import is_known_recording, look_at_frfs, look_at_recording
 from frf_ipz.ingest.formats.text_layout import sniff
+from frf_ipz.meshes.formats.universal import holds_geometry
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.text_numbers import NumberError, parse_number
 
@@ -58,6 +59,8 @@ class FolderContents:
         ``stiffness``, ``mass``, ``damping``, as far as they are there.
     groups : dict of str to dict of str to Path
         The same for additive parts, by their names.
+    geometry : Path, optional
+        Universal file with nodes and lines or elements between them.
     unread : dict of Path to str
         Files that look like measurements, and why they cannot be read as such.
     """
@@ -71,6 +74,7 @@ class FolderContents:
     nodes: Path | None
     matrices: dict[str, Path]
     groups: dict[str, dict[str, Path]]
+    geometry: Path | None
     unread: dict[Path, str]
 
     @property
@@ -108,6 +112,7 @@ def look_into(folder: Path) -> FolderContents:
     dof_tables = [path for path in files if path.suffix.lower() == CSV and _columns(path) >= DOF_COLUMNS]
     modes = [path for path in files if path.suffix.lower() == CSV and _columns(path) >= MODES_COLUMNS]
     modes += [path for path in files if path.suffix.lower() in UNIVERSAL and holds_shapes(path)]
+    geometries = [path for path in files if path.suffix.lower() in UNIVERSAL and holds_geometry(path)]
     found: dict[str, list[Path]] = {"recording": [], "frf": []}
     unread: dict[Path, str] = {}
     tables: list[FileFormatError] = []  # that cannot be read
@@ -117,6 +122,8 @@ def look_into(folder: Path) -> FolderContents:
         try:
             kind = _kind(path)
         except FileFormatError as error:
+            if path in geometries:
+                continue
             tables += [error] if path.suffix.lower() == CSV else []
             unread[path] = str(error).partition(": ")[2]
             continue
@@ -144,6 +151,7 @@ def look_into(folder: Path) -> FolderContents:
         nodes=deck if deck in files else None,
         matrices=matrices,
         groups=groups,
+        geometry=next(iter(geometries), None),
         unread=unread,
     )
 

@@ -104,6 +104,8 @@ def _taken_for(contents: FolderContents) -> list[str]:
     if contents.dof_table is not None:
         texts.append(f"{contents.name(contents.dof_table)}: rows of the matrices")
     texts += [] if contents.modes is None else [f"{contents.name(contents.modes)}: modes without FRFs"]
+    if contents.geometry is not None:
+        texts.append(f"{contents.name(contents.geometry)}: where the nodes are, for drawings")
     texts += [f"{contents.name(path)}: FRFs kept aside, no recording" for path in contents.references]
     texts += [f"{contents.name(path)}: left out, {reason}" for path, reason in contents.unread.items()]
     return texts

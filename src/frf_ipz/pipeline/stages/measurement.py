@@ -13,6 +13,7 @@ from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.late_imports import import_late
 from frf_ipz.pipeline.stages.mismatch import corrections
 from frf_ipz.rational import without_window
+from frf_ipz.runs.digests import digest_arrays
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Diagnosis
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from frf_ipz.modes import ModalParameters
     from frf_ipz.pipeline.stage_runner import StageRunner
     from frf_ipz.runs.folder import Writers
+    from frf_ipz.structure import Geometry
 else:
     fit_modes = import_late("frf_ipz.identification.fit", "fit_modes")
 
@@ -39,6 +41,9 @@ def ingest(runner: StageRunner) -> FrfEstimate:
     FrfEstimate
         FRFs and the table of records.
     """
+    geometry = runner.inputs.test.geometry
+    if runner.inputs.fe_model is None and geometry is not None:
+        _outline(runner, geometry)
     options = runner.inputs.options.ingest
     files = {name: runner.inputs.digests[name] for name in runner.inputs.measurement_names}
     return runner.stage(
@@ -81,6 +86,13 @@ def fit(
         lambda progress: fit_modes(frfs if modes is None else modes, options=options, progress=progress),
         lambda result: _files_of_fit(frfs, result),
     )
+
+
+def _outline(runner: StageRunner, geometry: Geometry) -> None:
+    """Keep where measured nodes are, and what joins them, for pictures of a structure without an FE model."""
+    places = [geometry.nodes, geometry.coordinates_m, geometry.lines]
+    faces = [] if geometry.mesh is None else [geometry.mesh.faces]
+    runner.stage("model", {"geometry": digest_arrays([*places, *faces])}, lambda _: geometry)
 
 
 def _files_of_ingest(result: FrfEstimate) -> Writers:
