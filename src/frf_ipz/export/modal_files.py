@@ -1,4 +1,4 @@
-"""Modes and FRFs in the files of other modal software: CSV, XLSX, and universal files 55 and 58.
+"""Modes and FRFs in the files of other modal software: CSV, XLSX, and universal files 55, 58 and of geometry.
 
 What the records hold: Universal File Datasets Summary, Structural Dynamics Research Laboratory, University of
 Cincinnati. Its numbers have six digits (shapes, frequency lines) and twelve (FRFs).
@@ -13,7 +13,7 @@ import lazy_loader
 import numpy as np
 
 from frf_ipz.arguments import as_path, require_type
-from frf_ipz.dofs import DIRECTIONS, Dof
+from frf_ipz.dofs import DIRECTIONS, Dof, node_dofs
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.export.run_tables import mode_table, pole_table
 from frf_ipz.frf import FrfSet
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
+    from frf_ipz.structure import Geometry
 
 openpyxl = lazy_loader.load("openpyxl")
 
@@ -42,6 +43,8 @@ REAL_DOUBLE, COMPLEX_DOUBLE = 4, 6
 FREQUENCY, FORCE, GENERAL = 18, 13, 1
 MOTIONS = {FrfQuantity.RECEPTANCE: 8, FrfQuantity.MOBILITY: 11, FrfQuantity.ACCELERANCE: 12}
 TRANSLATIONS = 3
+PEN_UP, NODES_A_LINE = 0, 8  # of trace lines
+SHELLS = {3: 91, 4: 94}  # linear thin shells by their corners
 EVEN = 1e-6  # of the spacing: the last digit of the step
 SHAPE_COLUMNS = [
     "mode",
@@ -55,7 +58,7 @@ SHAPE_COLUMNS = [
 ]
 
 
-def write_modes(fit: ModalFit, path: str | Path) -> None:
+def write_modes(fit: ModalFit, path: str | Path, *, geometry: Geometry | None = None) -> None:
     """Write natural frequencies, damping ratios and mode shapes for other modal software.
 
     Parameters
@@ -65,6 +68,8 @@ def write_modes(fit: ModalFit, path: str | Path) -> None:
     path : str or Path
         ``.csv``: one row a mode and DOF, which ``[[modes]]`` of a test reads; ``.xlsx``: a sheet of modes and one of
         shapes; ``.unv`` or ``.uff``: a data set 55 a mode.
+    geometry : Geometry, optional
+        Where the nodes are, for universal files: data sets 2411 (nodes), 82 (trace lines) and 2412 (faces, as shells).
 
     Raises
     ------
@@ -95,7 +100,9 @@ def write_modes(fit: ModalFit, path: str | Path) -> None:
             with np.printoptions(legacy=False):  # that of a program may shorten numbers
                 write_text(target, _shape_rows(fit).to_csv(index=False, lineterminator="\n"))
         else:
-            write_text(target, "\n".join(_shape_lines(fit)) + "\n")
+            shapes = _shape_lines(fit)
+            drawn = [] if geometry is None else [*_units(), *_geometry_lines(geometry, fit)]
+            write_text(target, "\n".join([*drawn, *shapes]) + "\n")
     except OSError as error:
         raise cannot_write(target, error) from None
 
@@ -204,6 +211,26 @@ def _shape_lines(fit: ModalFit) -> list[str]:
         lines += [_integers(2, 6, 1, mode + 1), *_numbers(_parts([pole, modal_a, -modal_a * pole]))]
         for node, row in zip(nodes, values, strict=True):
             lines += [_integers(node), *_numbers(_parts(row))]
+        lines.append(END)
+    return lines
+
+
+def _geometry_lines(geometry: Geometry, fit: ModalFit) -> list[str]:
+    """Give data sets of nodes in double precision, of lines that no face has, and of faces."""
+    mesh = geometry.outline({dof.node for dof in node_dofs(mode_shapes(fit).dofs)})
+    lines = [END, f"{2411:6d}"]
+    for node, place in zip(mesh.nodes.tolist(), mesh.coordinates_m.tolist(), strict=True):
+        lines += [_integers(node, 0, 0, 1), "".join(f"{value:25.16E}" for value in place).replace("E", "D")]
+    lines.append(END)
+    if len(mesh.lines):
+        pen = [number for pair in mesh.lines.tolist() for number in (*pair, PEN_UP)][:-1]
+        rows = [_integers(*pen[at : at + NODES_A_LINE]) for at in range(0, len(pen), NODES_A_LINE)]
+        lines += [END, f"{82:6d}", _integers(1, len(pen), 1), "frf_ipz", *rows, END]
+    if len(mesh.faces):
+        lines += [END, f"{2412:6d}"]
+        for number, face in enumerate(mesh.faces.tolist(), start=1):
+            corners = tuple(dict.fromkeys(face))
+            lines += [_integers(number, SHELLS[len(corners)], 1, 1, 1, len(corners)), _integers(*corners)]
         lines.append(END)
     return lines
 

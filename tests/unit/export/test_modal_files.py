@@ -9,6 +9,7 @@ import frf_ipz
 from clamped_beam import BEAM
 from frf_ipz.ingest.formats.modes_file import ModesSource
 from frf_ipz.ingest.formats.registry import read_modes_file
+from frf_ipz.meshes.registry import read_mesh
 
 SIX_DIGITS, TWELVE_DIGITS = 1e-5, 1e-11
 LINES = np.arange(5.0, 400.0, 0.5)
@@ -83,6 +84,29 @@ def test_shapes_are_read_back_by_pyuff(frfs, tmp_path):
         shape = complex(of_mode.loc["11:z", "shape_real"], of_mode.loc["11:z", "shape_imag"])
         assert abs(entry["r3"][node] - shape) < SIX_DIGITS * abs(shape)
         assert abs(entry["r1"][node]) == 0
+
+
+SQUARE = frf_ipz.Mesh(
+    nodes=np.array([3, 11, 21, 40]), coordinates_m=np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.5]], float),
+    lines=np.array([[3, 11], [11, 21], [21, 40]]), faces=np.array([[3, 11, 21, 21], [3, 11, 21, 40]]),
+)  # fmt: skip
+
+
+def test_the_geometry_is_read_back_by_pyuff_and_by_this_program(frfs, tmp_path):
+    fit = frf_ipz.fit_modes(frfs.select_frfs([0, 1]))
+    nodes = np.append(SQUARE.nodes, 16)
+    places = np.vstack([SQUARE.coordinates_m, [[1 / 3, 0.0, 1e-20]]])
+    geometry = frf_ipz.Geometry(nodes=nodes, coordinates_m=places, lines=SQUARE.lines, mesh=SQUARE)
+    frf_ipz.write_modes(fit, tmp_path / "modes.unv", geometry=geometry)
+    sets = {entry["type"]: entry for entry in data_sets(tmp_path / "modes.unv")}
+    assert list(sets) == [164, 2411, 82, 2412, 55]
+    np.testing.assert_array_equal(sets[2411]["node_nums"], [3, 11, 21, 40])  # 16 was not measured
+    np.testing.assert_allclose(np.stack([sets[2411][axis] for axis in "xyz"], 1), SQUARE.coordinates_m)
+    assert list(sets[82]["nodes"]) == [3, 11, 0, 11, 21, 0, 21, 40]
+    assert [sets[2412][kind][0]["nodes_nums"] for kind in (91, 94)] == [[3, 11, 21], [3, 11, 21, 40]]
+    drawn = read_mesh(tmp_path / "modes.unv").geometry().mesh
+    assert {tuple(face) for face in drawn.faces.tolist()} == {tuple(face) for face in SQUARE.faces.tolist()}
+    assert len(read_modes_file(ModesSource(path=tmp_path / "modes.unv")).damping_ratio) == fit.n_modes
 
 
 @pytest.mark.parametrize(("name", "tolerance"), [("modes.unv", SIX_DIGITS), ("modes.csv", 1e-14)])

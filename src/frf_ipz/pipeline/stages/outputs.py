@@ -24,6 +24,7 @@ from frf_ipz.pipeline.stages.mismatch import effects_of
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.rational import without_window
 from frf_ipz.report.page import write_report
+from frf_ipz.runs.digests import digest_arrays
 from frf_ipz.runs.results import Results
 from frf_ipz.updating.updated_model import UpdateStatus
 
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     from frf_ipz.pipeline.stage_runner import StageRunner
     from frf_ipz.prediction.prediction import Prediction
     from frf_ipz.runs.folder import Writers
-    from frf_ipz.structure import StructuralModel
+    from frf_ipz.structure import Geometry, StructuralModel
     from frf_ipz.updating.updated_model import UpdatedModel
 
 WEIGHT_LINES = 400  # of the band, at equal ratios, on which the uncertainty of an output is bounded
@@ -222,11 +223,21 @@ def files(runner: StageRunner, modal_fit: ModalFit, frfs: FrfSet) -> None:
         runner.store.mark_stale(("files",))
         return
     measured = without_window(frfs, modal_fit.model)
-    key = runner.make_key("files", {"after": runner.after("fit"), "asked": sorted(asked)})
+    geometry = _geometry(runner)
+    places = "" if geometry is None else digest_arrays([geometry.nodes, geometry.coordinates_m, geometry.lines])
+    key = runner.make_key("files", {"after": runner.after("fit"), "asked": sorted(asked), "places": places})
     write_all: Writers = {
-        name: partial(write_frfs, measured) if name == "frf.unv" else partial(write_modes, modal_fit) for name in asked
+        name: partial(write_frfs, measured) if name == "frf.unv" else partial(write_modes, modal_fit, geometry=geometry)
+        for name in asked
     }
     runner.store.page("files", key, write_all)
+
+
+def _geometry(runner: StageRunner) -> Geometry | None:
+    """Where the nodes are: of the model, else of the test; None where they are drawn in a row."""
+    model = runner.inputs.fe_model
+    geometry = runner.inputs.test.geometry if model is None else model.drawn_geometry
+    return None if geometry is None or geometry.is_schematic else geometry
 
 
 def report(runner: StageRunner) -> None:
