@@ -1,12 +1,18 @@
 """The time is found however programs write their first columns; what is no table is left out, or said."""
 
 import re
+import threading
+import time
+import weakref
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
+from frf_ipz.ingest.formats import text_table
+from frf_ipz.ingest.formats.text_layout import sniff
 from frf_ipz.ingest.recording_files import RecordingFiles
 from synthetic_campaign import HIT, Structure, impact, write_csv, write_test
 
@@ -239,3 +245,28 @@ def test_the_line_of_names_can_be_stated(tmp_path):
 )
 def test_ways_to_write_a_table(tmp_path, change):
     expect(read(write(tmp_path, change)))
+
+
+def test_what_reads_in_a_thread_has_let_go_of_the_file_before_it_goes_on(tmp_path, monkeypatch):
+    """Python may end right after; a thread that then drops an object of Python's aborts the process."""
+    held = []
+
+    def hold(stream):
+        time.sleep(0.05)
+        del stream
+
+    class SlowReader:
+        def __init__(self, stream, **_):
+            self.threads = [threading.Thread(target=hold, args=(stream,))]
+            held.append(weakref.ref(stream))
+            self.threads[0].start()
+
+        def __iter__(self):
+            return iter(())
+
+    monkeypatch.setattr(text_table.arrow_csv, "open_csv", SlowReader)
+    path = tmp_path / "a.csv"
+    path.write_text("time,force\n0.0,1.0\n0.1,2.0\n", encoding="utf-8")
+    layout = sniff(path)
+    assert not list(text_table.read_blocks(layout, ["time", "force"], {0: pa.float64()}))
+    assert [reference() for reference in held] == [None]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+import weakref
+from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
 
 BLOCK_BYTES = 1 << 22
 LINES_AT_ONCE = 10_000
+LET_GO_S, PAUSE_S = 1.0, 1e-4  # at most, for threads of pyarrow to drop what they have read; between two looks
 
 
 def column_index(layout: TextLayout, names: Sequence[str], column: str) -> int:
@@ -89,9 +93,9 @@ def read_blocks(layout: TextLayout, names: Sequence[str], types: dict[int, pa.Da
     keys = [f"{index}" for index in range(len(names))]
     n_rows = 0
     try:
-        with open_text(layout.path) as stream:
+        with open_text(layout.path) as stream, _let_go_of(_rows_only(stream, layout)) as rows:
             reader = arrow_csv.open_csv(
-                _rows_only(stream, layout),
+                rows.pop(),
                 read_options=arrow_csv.ReadOptions(column_names=keys, block_size=BLOCK_BYTES, use_threads=False),
                 parse_options=arrow_csv.ParseOptions(delimiter=_arrow_delimiter(layout)),
                 convert_options=arrow_csv.ConvertOptions(
@@ -101,11 +105,31 @@ def read_blocks(layout: TextLayout, names: Sequence[str], types: dict[int, pa.Da
                     strings_can_be_null=False,
                 ),
             )
-            for batch in reader:
-                yield batch
-                n_rows += len(batch)
+            try:
+                for batch in reader:
+                    yield batch
+                    n_rows += len(batch)
+            finally:
+                del reader
     except pa.ArrowInvalid:
         yield from _read_line_by_line(layout, names, types, n_rows)
+
+
+@contextmanager
+def _let_go_of(stream: _Part | _BlankSeparated) -> Iterator[list[_Part | _BlankSeparated]]:
+    """Lend a stream to pyarrow, whose threads may drop it a little later than the reader.
+
+    Where Python ends in between, the process is aborted, and its exit status with it (apache/arrow, issue 34314).
+    """
+    held, lent = weakref.ref(stream), [stream]
+    del stream
+    try:
+        yield lent
+    finally:
+        lent.clear()
+        latest = time.monotonic() + LET_GO_S
+        while held() is not None and time.monotonic() < latest:
+            time.sleep(PAUSE_S)
 
 
 def _read_line_by_line(
