@@ -40,7 +40,7 @@ STABILITY: tuple[tuple[str, Colour, float, str, bool, float], ...] = (
     ("new", Role.MUTED, 0.55, "cross", False, 6),
     ("stable in frequency", 4, 1.0, "circle", False, 7),
     ("stable in frequency and damping", 0, 1.0, "diamond", True, 7),
-    ("stable in frequency, damping and shape", 2, 1.0, "circle", True, 8),
+    ("stable in shape too", 2, 1.0, "circle", True, 8),
 )
 VERDICTS: Mapping[PairVerdict, tuple[Colour, str, bool]] = {
     PairVerdict.PAIRED: (Role.GOOD, "circle", True),
