@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.io
 from scipy import sparse
 
 from fe_models import beam
@@ -32,7 +33,28 @@ def write_numpy(folder, model):
     (folder / "dofs.csv").write_text("node,direction,x_m,y_m,z_m\n" + rows)
 
 
-@pytest.mark.parametrize(("write", "marks"), [(write_calculix, 'units = "SI"'), (write_numpy, 'mass = "M.npz"')])
+def write_matlab(folder, model):
+    write_numpy(folder, model)
+    scipy.io.savemat(folder / "fem.mat", {name: sparse.load_npz(folder / f"{name}.npz") for name in "KM"})
+    for name in "KM":
+        (folder / f"{name}.npz").unlink()
+
+
+def write_named_rows(folder, model):
+    places = dict(zip(model.geometry.nodes.tolist(), model.geometry.coordinates_m.tolist(), strict=True))
+    rows = {"dofs": [dof.name for dof in model.dofs], "coordinates": [places[dof.node] for dof in model.dofs]}
+    np.savez(folder / "fem.npz", K=model.stiffness.toarray(), M=model.mass.toarray(), **rows)
+
+
+@pytest.mark.parametrize(
+    ("write", "marks"),
+    [
+        (write_matlab, 'mass = "fem.mat"'),
+        (write_named_rows, 'mass = "fem.npz"'),
+        (write_calculix, 'units = "SI"'),
+        (write_numpy, 'mass = "M.npz"'),
+    ],
+)
 def test_a_model_in_the_folder_is_found_and_read(tmp_path, write, marks):
     model = beam(left="clamped", elements=5)
     write(tmp_path, model)

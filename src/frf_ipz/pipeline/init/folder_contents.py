@@ -8,6 +8,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.fe.matrices.registry import read_matrix
+from frf_ipz.fe.matrices.stored import MatrixRequest
 from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.formats.modes_uff import holds_shapes
 from frf_ipz.ingest.formats.registry import is_known_recording, look_at_frfs, look_at_recording
@@ -30,6 +32,8 @@ BARE_FRF = ("frequency_hz", "real", "imag")  # columns of a table without names,
 FEWEST_ROWS = 16  # of a recording
 DOF_COLUMNS = frozenset({"node", "direction"})
 UNIVERSAL = (".unv", ".uff")
+FULL, ARRAYS_OF_BOTH = ".full", (".mat", ".npz")
+ROWS, NAMED_ROWS = "rows", "named rows"
 MATRIX = re.compile(
     r"^(?:(?P<stiffness>k|stiff\w*)|(?P<mass>m|mass)|(?P<damping>[bcd]|damp\w*))(?:[_-](?P<group>.+))?$", re.I
 )
@@ -57,6 +61,8 @@ class FolderContents:
         The deck of a model whose rows have no positions.
     matrices : dict of str to Path
         ``stiffness``, ``mass``, ``damping``, as far as they are there.
+    names_rows : bool
+        The files of the matrices say themselves what their rows are.
     groups : dict of str to dict of str to Path
         The same for additive parts, by their names.
     geometry : Path, optional
@@ -73,6 +79,7 @@ class FolderContents:
     dof_table: Path | None
     nodes: Path | None
     matrices: dict[str, Path]
+    names_rows: bool
     groups: dict[str, dict[str, Path]]
     geometry: Path | None
     unread: dict[Path, str]
@@ -80,8 +87,7 @@ class FolderContents:
     @property
     def has_matrices(self) -> bool:
         """There is what a model of matrices needs."""
-        names_rows = any(path.suffix.lower() == ".full" for path in self.matrices.values())
-        return {"mass", "stiffness"} <= set(self.matrices) and (self.dof_table is not None or names_rows)
+        return {"mass", "stiffness"} <= set(self.matrices) and (self.dof_table is not None or self.names_rows)
 
     def name(self, path: Path) -> str:
         """Name a file as a TOML file in the folder does."""
@@ -112,12 +118,17 @@ def look_into(folder: Path) -> FolderContents:
     dof_tables = [path for path in files if path.suffix.lower() == CSV and _columns(path) >= DOF_COLUMNS]
     modes = [path for path in files if path.suffix.lower() == CSV and _columns(path) >= MODES_COLUMNS]
     modes += [path for path in files if path.suffix.lower() in UNIVERSAL and holds_shapes(path)]
+    matrices, groups, names_rows = _sort_matrices(files)
     geometries = [path for path in files if path.suffix.lower() in UNIVERSAL and holds_geometry(path)]
     found: dict[str, list[Path]] = {"recording": [], "frf": []}
     unread: dict[Path, str] = {}
     tables: list[FileFormatError] = []  # that cannot be read
     for path in files:
-        if path in {*dof_tables, *modes} or path.suffix.lower() in {*OTHER, *DECKS} or _is_array_of_model(path):
+        if (
+            path in {*dof_tables, *modes, *matrices.values()}
+            or path.suffix.lower() in {*OTHER, *DECKS}
+            or _is_array_of_model(path)
+        ):
             continue
         try:
             kind = _kind(path)
@@ -138,7 +149,6 @@ def look_into(folder: Path) -> FolderContents:
         hint = "".join(f"; {path.name}: {reason}" for path, reason in list(unread.items())[:1])
         problem = "holds no recordings and no FRFs in a format that is read (CSV, text, UFF, MATLAB, HDF5, ...)"
         raise InputError(f"{folder}: {problem}; put them there, one file an impact, then run init again{hint}")
-    matrices, groups = _sort_matrices(files)
     calculix = next((path for path in files if path.suffix.lower() == ".dof"), None)
     deck = calculix.with_suffix(".inp") if calculix is not None and not dof_tables else None
     return FolderContents(
@@ -150,6 +160,7 @@ def look_into(folder: Path) -> FolderContents:
         dof_table=next(iter(dof_tables), calculix),
         nodes=deck if deck in files else None,
         matrices=matrices,
+        names_rows=names_rows,
         groups=groups,
         geometry=next(iter(geometries), None),
         unread=unread,
@@ -227,8 +238,11 @@ def _columns(path: Path) -> frozenset[str]:
     return frozenset(name.strip().lower() for fields in layout.header for name in fields)
 
 
-def _sort_matrices(files: list[Path]) -> tuple[dict[str, Path], dict[str, dict[str, Path]]]:
-    """Tell matrices by the letters that they usually have: K, M and B, C or D; what follows names a part."""
+def _sort_matrices(files: list[Path]) -> tuple[dict[str, Path], dict[str, dict[str, Path]], bool]:
+    """Tell matrices by the letters that they usually have: K, M and B, C or D; what follows names a part.
+
+    Without them, a file of arrays may hold both. Tells besides whether the files say what their rows are.
+    """
     matrices: dict[str, Path] = {}
     groups: dict[str, dict[str, Path]] = {}
     for path in files:
@@ -243,4 +257,21 @@ def _sort_matrices(files: list[Path]) -> tuple[dict[str, Path], dict[str, dict[s
             matrices.setdefault(kind, path)
         else:
             groups.setdefault(found["group"], {}).setdefault(kind, path)
-    return matrices, {name: parts for name, parts in groups.items() if "stiffness" in parts}
+    groups = {name: parts for name, parts in groups.items() if "stiffness" in parts}
+    if matrices:
+        return matrices, groups, any(path.suffix.lower() == FULL for path in matrices.values())
+    for path in files:
+        if path.suffix.lower() in ARRAYS_OF_BOTH and (rows := _holds_both(path)):
+            return {"mass": path, "stiffness": path}, groups, rows == NAMED_ROWS
+    return matrices, groups, False
+
+
+def _holds_both(path: Path) -> str:
+    """Tell whether a file of arrays holds a stiffness and a mass, and whether it names their rows."""
+    try:
+        stiffness, mass = (read_matrix(MatrixRequest(path=path, what=what)) for what in ("stiffness", "mass"))
+    except FileFormatError:
+        return ""
+    if stiffness.matrix.shape != mass.matrix.shape or not (stiffness.matrix - mass.matrix).count_nonzero():
+        return ""
+    return ROWS if stiffness.dofs is None else NAMED_ROWS
