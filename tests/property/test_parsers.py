@@ -1,5 +1,6 @@
 """Whatever lies in a file, a parser reads it or refuses it with an error of the project; ``-m slow`` looks longer."""
 
+import re
 import tempfile
 from functools import cache
 from io import BytesIO
@@ -494,3 +495,12 @@ def test_what_a_longer_search_has_found_is_refused(name, change):
     assert refusal is not None
     assert name in refusal
     assert len(refusal) < LONGEST
+
+
+@pytest.mark.parametrize("name", ["recording.h5", "recording.mat"])
+def test_absurdly_large_samples_are_refused_in_binary_formats_too(name):
+    """As in text: their squares overflow, and a result would come of it."""
+    data, place = valid_bytes(name), int(np.argmax(SIGNALS["force"]))
+    changed = data.replace(SIGNALS["force"][place].tobytes(), np.float64(1e200).tobytes())
+    expected = f"sample {place + 1} of .*force.* is no number, or absurdly large"
+    assert re.search(expected, refusal_of(name, changed) or "")

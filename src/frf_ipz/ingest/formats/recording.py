@@ -10,6 +10,8 @@ from typing import Protocol, runtime_checkable
 from frf_ipz.arrays import FloatArray
 from frf_ipz.dofs import Dof
 
+LARGEST = 1e100  # a larger value is no measurement, and its square may overflow
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableKeys:

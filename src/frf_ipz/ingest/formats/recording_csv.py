@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from frf_ipz.errors import FileFormatError
-from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents, SignalColumn
+from frf_ipz.ingest.formats.recording import LARGEST, RawRecording, RecordingContents, SignalColumn
 from frf_ipz.ingest.formats.text_columns import TIME, find_columns, no_time, seconds_of_day, unwrap_days
 from frf_ipz.ingest.formats.text_layout import is_number, name_and_unit, sniff
 from frf_ipz.ingest.formats.text_table import column_index, line_of_row, not_a_number, read_blocks
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.text_columns import TextColumns
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
-LARGEST = 1e100  # a larger value is no measurement, and its square may overflow
 SAME_RATE = 0.01  # the contract's limit for a step that differs
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.errors import FileFormatError
-from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents, SignalColumn
+from frf_ipz.ingest.formats.recording import LARGEST, RawRecording, RecordingContents, SignalColumn
 from frf_ipz.ingest.formats.universal_file import (
     TIME_RESPONSE,
     describe_functions,
@@ -48,9 +48,10 @@ class _UniversalRecordings:
             if not np.array_equal(function.x, first.x):
                 problem = f"data sets {first.number} and {function.number} have different times; export them together"
                 raise FileFormatError(path, problem, where=f"line {function.line}")
-            is_finite = np.isfinite(function.values)
+            is_finite = np.abs(function.values) < LARGEST
             if not is_finite.all():
-                problem = f"sample {int(np.argmin(is_finite)) + 1} of data set {function.number} is not finite"
+                sample = int(np.argmin(is_finite)) + 1
+                problem = f"sample {sample} of data set {function.number} is not finite, or absurdly large"
                 raise FileFormatError(path, f"{problem}; correct the file", where=f"line {function.line}")
         table = np.column_stack([first.x, *(function.values.real for function in chosen)])
         return RawRecording(

@@ -14,7 +14,7 @@ from frf_ipz.ingest import formats
 from frf_ipz.ingest.formats.file_arrays import ArrayFormat
 from frf_ipz.ingest.formats.frf_file import FrfFormat
 from frf_ipz.ingest.formats.modes_file import ModesFormat
-from frf_ipz.ingest.formats.recording import RecordingFormat, TableKeys
+from frf_ipz.ingest.formats.recording import LARGEST, RecordingFormat, TableKeys
 from frf_ipz.ingest.formats.text_layout import read_head
 
 if TYPE_CHECKING:
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.modes_file import ModesSource
     from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents
     from frf_ipz.modes import ModalParameters
-
-
-LARGEST = 1e100  # the square of a larger value may overflow
 
 
 def open_recording(path: Path, columns: Sequence[str], keys: TableKeys | None = None) -> RawRecording:

@@ -12,7 +12,7 @@ import numpy as np
 from frf_ipz.arrays import FloatArray
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError, did_you_mean
-from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents, SignalColumn, TableKeys
+from frf_ipz.ingest.formats.recording import LARGEST, RawRecording, RecordingContents, SignalColumn, TableKeys
 from frf_ipz.ingest.units import unit_factor
 
 SAME_RATE = 0.01  # the contract's limit for a step that differs
@@ -206,11 +206,10 @@ def open_signals(table: SignalTable, columns: Sequence[str], keys: TableKeys) ->
     chosen = [find_signal(table, column) for column in columns] or list(_usual_signals(table))[:1]
     for signal in chosen:
         _require_same_length(table, chosen[0], signal)
-        wrong = ~np.isfinite(signal.values)
+        wrong = ~(np.abs(signal.values) < LARGEST)
         if wrong.any():
-            problem = (
-                f"sample {int(np.argmax(wrong)) + 1} of '{signal.name}' is no number ({int(wrong.sum())} are none)"
-            )
+            sample, count = int(np.argmax(wrong)) + 1, int(wrong.sum())
+            problem = f"sample {sample} of '{signal.name}' is no number, or absurdly large ({count} are)"
             raise FileFormatError(table.path, f"{problem}; correct the file, or leave it out of the test")
     time, time_unit, time_name = _find_time(table, chosen, keys)
     return RawRecording(
