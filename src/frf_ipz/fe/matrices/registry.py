@@ -52,6 +52,28 @@ def read_matrix(request: MatrixRequest) -> StoredMatrix:
     return stored
 
 
+def matrix_names(path: Path) -> tuple[str, ...]:
+    """Give what the matrices of a file are called, in the formats of Nastran.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    tuple of str
+        Names of square matrices; none for a file of another format.
+
+    Raises
+    ------
+    FileFormatError
+        If it cannot be read.
+    """
+    head = _read_head(path)
+    return next(candidate for candidate in _formats() if candidate.fits(path, head)).names(path)
+
+
 def recognises(path: Path) -> bool:
     """Tell whether a file is of a format of matrices that says so itself.
 

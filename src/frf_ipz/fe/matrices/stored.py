@@ -21,9 +21,9 @@ MOST_BYTES = 1 << 31  # of one file, expanded
 LONGEST = 200  # letters of a foreign message
 DOFS_SHOWN = 3
 NAMES = {  # of matrices in files that hold several, in small letters, the most telling first
-    "stiffness": ("k", "stiffness", "stiff", "kaa", "kxx", "kgg", "kff", "kll", "kjj", "khh", "kmat"),
-    "mass": ("m", "mass", "maa", "mxx", "mgg", "mff", "mll", "mjj", "mhh", "mmat"),
-    "damping": ("c", "b", "d", "damping", "damp", "baa", "bxx1", "bxx", "bgg", "cmat"),
+    "stiffness": ("k", "stiffness", "stiff", "kaa", "kxx", "kgg", "kff", "kll", "kjj", "khh", "kaax", "kmat"),
+    "mass": ("m", "mass", "maa", "mxx", "mgg", "mff", "mll", "mjj", "mhh", "maax", "mmat"),
+    "damping": ("c", "b", "d", "damping", "damp", "baa", "bxx1", "bxx", "bgg", "baax", "cmat"),
 }
 
 
@@ -164,11 +164,14 @@ class MatrixFormat:
         Given a path and the first bytes of the file: whether it is of this format.
     read : callable
         Given a `MatrixRequest`: its `StoredMatrix`.
+    names : callable
+        Given a path: what the matrices are called of which a file of a format without other contents holds several.
     """
 
     rank: int
     fits: Callable[[Path, bytes], bool]
     read: Callable[[MatrixRequest], StoredMatrix]
+    names: Callable[[Path], tuple[str, ...]] = lambda path: ()  # noqa: ARG005
 
 
 def as_matrix(values: Any, request: MatrixRequest) -> Matrix:  # noqa: ANN401 - an array of NumPy or SciPy

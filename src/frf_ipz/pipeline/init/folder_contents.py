@@ -8,13 +8,12 @@ from itertools import pairwise
 from pathlib import Path
 
 from frf_ipz.errors import FileFormatError, InputError
-from frf_ipz.fe.matrices.registry import read_matrix
-from frf_ipz.fe.matrices.stored import MatrixRequest
 from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.formats.modes_uff import holds_shapes
 from frf_ipz.ingest.formats.registry import is_known_recording, look_at_frfs, look_at_recording
 from frf_ipz.ingest.formats.text_layout import sniff
 from frf_ipz.meshes.formats.universal import holds_geometry
+from frf_ipz.pipeline.init.model_files import MODEL_SUFFIXES, FoundModel, find_models, is_array_of_model
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.text_numbers import NumberError, parse_number
 
@@ -22,8 +21,6 @@ MODES_COLUMNS = frozenset({"mode", "frequency_hz", "damping_ratio", "dof", "real
 CSV = ".csv"
 TEXT = (".txt", ".dat", ".asc", ".tsv", ".prn", ".xlsx")  # may be a table, and may be anything else
 OTHER = (".toml", ".py", ".m", ".md", ".json", ".html", ".mtx")  # settings, programs, results
-DECKS = (".sti", ".mas", ".dof", ".full", ".inp", ".bdf", ".op4", ".op2", ".asm", ".pch")  # of FE programs
-ARRAYS = (".npz", ".npy")  # matrices where they are called so, else recordings or FRFs
 UNTIMED = (
     "is a table without a column of time that grows by equal steps; where it is a recording, call it .csv, and write "
     "sample_rate_hz under [test]; where it is an FRF, say 'columns' in an [[frf]]"
@@ -31,13 +28,8 @@ UNTIMED = (
 BARE_FRF = ("frequency_hz", "real", "imag")  # columns of a table without names, as CutPro writes it
 FEWEST_ROWS = 16  # of a recording
 DOF_COLUMNS = frozenset({"node", "direction"})
+PLACE_COLUMNS = (frozenset({"node", "x", "y", "z"}), frozenset({"node", "x_m", "y_m", "z_m"}))
 UNIVERSAL = (".unv", ".uff")
-FULL, ARRAYS_OF_BOTH = ".full", (".mat", ".npz")
-ROWS, NAMED_ROWS = "rows", "named rows"
-MATRIX = re.compile(
-    r"^(?:(?P<stiffness>k|stiff\w*)|(?P<mass>m|mass)|(?P<damping>[bcd]|damp\w*))(?:[_-](?P<group>.+))?$", re.I
-)
-KINDS_BY_SUFFIX = {".sti": ("stiffness",), ".mas": ("mass",), ".full": ("mass", "stiffness")}
 KEPT_ASIDE = re.compile(r"reference|aside|poi([_-]|$)|truth|validation", re.IGNORECASE)
 
 
@@ -55,16 +47,8 @@ class FolderContents:
         FRFs that were kept aside: by their names, or because there are recordings too.
     modes : Path, optional
         Modes that were identified elsewhere.
-    dof_table : Path, optional
-        ``dofs.csv``, or CalculiX's ``.dof``.
-    nodes : Path, optional
-        The deck of a model whose rows have no positions.
-    matrices : dict of str to Path
-        ``stiffness``, ``mass``, ``damping``, as far as they are there.
-    names_rows : bool
-        The files of the matrices say themselves what their rows are.
-    groups : dict of str to dict of str to Path
-        The same for additive parts, by their names.
+    models : tuple of FoundModel
+        FE models, the one to take first; more than one where a folder holds several.
     geometry : Path, optional
         Universal file with nodes and lines or elements between them.
     unread : dict of Path to str
@@ -76,18 +60,14 @@ class FolderContents:
     frfs: tuple[Path, ...]
     references: tuple[Path, ...]
     modes: Path | None
-    dof_table: Path | None
-    nodes: Path | None
-    matrices: dict[str, Path]
-    names_rows: bool
-    groups: dict[str, dict[str, Path]]
+    models: tuple[FoundModel, ...]
     geometry: Path | None
     unread: dict[Path, str]
 
     @property
-    def has_matrices(self) -> bool:
-        """There is what a model of matrices needs."""
-        return {"mass", "stiffness"} <= set(self.matrices) and (self.dof_table is not None or self.names_rows)
+    def model(self) -> FoundModel:
+        """The FE model to take; an empty one where there is none."""
+        return self.models[0] if self.models else FoundModel()
 
     def name(self, path: Path) -> str:
         """Name a file as a TOML file in the folder does."""
@@ -118,16 +98,18 @@ def look_into(folder: Path) -> FolderContents:
     dof_tables = [path for path in files if path.suffix.lower() == CSV and _columns(path) >= DOF_COLUMNS]
     modes = [path for path in files if path.suffix.lower() == CSV and _columns(path) >= MODES_COLUMNS]
     modes += [path for path in files if path.suffix.lower() in UNIVERSAL and holds_shapes(path)]
-    matrices, groups, names_rows = _sort_matrices(files)
+    places = [path for path in files if path.suffix.lower() == CSV and _columns(path) in PLACE_COLUMNS]
+    models = find_models(files, dof_tables, places)
+    of_models = {path for model in models for path in model.paths}
     geometries = [path for path in files if path.suffix.lower() in UNIVERSAL and holds_geometry(path)]
     found: dict[str, list[Path]] = {"recording": [], "frf": []}
     unread: dict[Path, str] = {}
     tables: list[FileFormatError] = []  # that cannot be read
     for path in files:
         if (
-            path in {*dof_tables, *modes, *matrices.values()}
-            or path.suffix.lower() in {*OTHER, *DECKS}
-            or _is_array_of_model(path)
+            path in {*dof_tables, *places, *modes, *of_models}
+            or path.suffix.lower() in {*OTHER, *MODEL_SUFFIXES}
+            or is_array_of_model(path)
         ):
             continue
         try:
@@ -149,19 +131,13 @@ def look_into(folder: Path) -> FolderContents:
         hint = "".join(f"; {path.name}: {reason}" for path, reason in list(unread.items())[:1])
         problem = "holds no recordings and no FRFs in a format that is read (CSV, text, UFF, MATLAB, HDF5, ...)"
         raise InputError(f"{folder}: {problem}; put them there, one file an impact, then run init again{hint}")
-    calculix = next((path for path in files if path.suffix.lower() == ".dof"), None)
-    deck = calculix.with_suffix(".inp") if calculix is not None and not dof_tables else None
     return FolderContents(
         folder=folder,
         recordings=recordings,
         frfs=frfs,
         references=references,
         modes=next(iter(modes), None),
-        dof_table=next(iter(dof_tables), calculix),
-        nodes=deck if deck in files else None,
-        matrices=matrices,
-        names_rows=names_rows,
-        groups=groups,
+        models=tuple(models),
         geometry=next(iter(geometries), None),
         unread=unread,
     )
@@ -222,10 +198,6 @@ def _is_table(path: Path) -> bool:
     return layout.n_columns > 1 and len(layout.rows) >= FEWEST_ROWS
 
 
-def _is_array_of_model(path: Path) -> bool:
-    return path.suffix.lower() in ARRAYS and MATRIX.match(path.stem) is not None
-
-
 def _is_hidden(path: Path, folder: Path) -> bool:
     return any(part.startswith(".") for part in path.relative_to(folder).parts)
 
@@ -236,42 +208,3 @@ def _columns(path: Path) -> frozenset[str]:
     except FileFormatError:  # said where its kind is asked for
         return frozenset()
     return frozenset(name.strip().lower() for fields in layout.header for name in fields)
-
-
-def _sort_matrices(files: list[Path]) -> tuple[dict[str, Path], dict[str, dict[str, Path]], bool]:
-    """Tell matrices by the letters that they usually have: K, M and B, C or D; what follows names a part.
-
-    Without them, a file of arrays may hold both. Tells besides whether the files say what their rows are.
-    """
-    matrices: dict[str, Path] = {}
-    groups: dict[str, dict[str, Path]] = {}
-    for path in files:
-        suffix = path.suffix.lower()
-        for kind in KINDS_BY_SUFFIX.get(suffix, ()):
-            matrices.setdefault(kind, path)
-        found = MATRIX.match(path.stem) if suffix == ".mtx" or _is_array_of_model(path) else None
-        if found is None:
-            continue
-        kind = next(name for name in ("stiffness", "mass", "damping") if found[name])
-        if found["group"] is None:
-            matrices.setdefault(kind, path)
-        else:
-            groups.setdefault(found["group"], {}).setdefault(kind, path)
-    groups = {name: parts for name, parts in groups.items() if "stiffness" in parts}
-    if matrices:
-        return matrices, groups, any(path.suffix.lower() == FULL for path in matrices.values())
-    for path in files:
-        if path.suffix.lower() in ARRAYS_OF_BOTH and (rows := _holds_both(path)):
-            return {"mass": path, "stiffness": path}, groups, rows == NAMED_ROWS
-    return matrices, groups, False
-
-
-def _holds_both(path: Path) -> str:
-    """Tell whether a file of arrays holds a stiffness and a mass, and whether it names their rows."""
-    try:
-        stiffness, mass = (read_matrix(MatrixRequest(path=path, what=what)) for what in ("stiffness", "mass"))
-    except FileFormatError:
-        return ""
-    if stiffness.matrix.shape != mass.matrix.shape or not (stiffness.matrix - mass.matrix).count_nonzero():
-        return ""
-    return ROWS if stiffness.dofs is None else NAMED_ROWS

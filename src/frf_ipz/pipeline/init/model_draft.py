@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frf_ipz.pipeline.init.folder_contents import KINDS_BY_SUFFIX
 from frf_ipz.pipeline.init.text import HEAD, guessed, quoted
 
 if TYPE_CHECKING:
@@ -64,24 +63,41 @@ def draft_model(contents: FolderContents) -> str:
         Text of ``model.toml``.
     """
     name = quoted(contents.folder.resolve().name)
-    if not contents.has_matrices:
+    found = contents.model
+    if not found.is_complete:
         return "# Written by 'frf-ipz init': a skeleton." + SKELETON.format(name=name)
     lines = [HEAD, "[model]", 'kind = "matrices"', f"name = {name}"]
-    if any(path.suffix.lower() in KINDS_BY_SUFFIX for path in contents.matrices.values()):
+    if not found.is_in_si:
         lines.append(guessed('units = "SI"', "what the deck is in: SI, mm-t-s, mm-kg-ms or in-lbf-s"))
     lines += ["", "[damping]"]
     lines.append(guessed("modal_ratio = 0.01", "one ratio for all modes, or a list; updated where measured"))
-    lines += ["", "[matrices]"]
-    lines += [
-        guessed(f"{kind} = {quoted(contents.name(contents.matrices[kind]))}", unit)
-        for kind, unit in (("mass", "in kg"), ("stiffness", "in N/m"), ("damping", "in N s/m"))
-        if kind in contents.matrices
-    ]
-    if contents.dof_table is not None:
-        lines.append(f"dofs = {quoted(contents.name(contents.dof_table))}")
-    if contents.nodes is not None:
-        lines.append(f"nodes = {quoted(contents.name(contents.nodes))}")
-    for group, parts in contents.groups.items():
+    lines += ["", "[matrices]", *_matrices(contents)]
+    if found.rows is not None:
+        rows = f"dofs = {quoted(contents.name(found.rows))}"
+        lines.append(guessed(rows, "has other rows than the matrices") if "rows" in found.guessed else rows)
+    if found.nodes is not None:
+        nodes = f"nodes = {quoted(contents.name(found.nodes))}"
+        lines.append(guessed(nodes, "counted from 1 in the file's order") if "nodes" in found.guessed else nodes)
+    for group, parts in found.groups.items():
         lines += ["", "[[matrices.group]]", f"name = {quoted(group)}"]
         lines += [f"{kind} = {quoted(contents.name(parts[kind]))}" for kind in ("stiffness", "mass") if kind in parts]
     return "\n".join(lines) + "\n"
+
+
+def _matrices(contents: FolderContents) -> list[str]:
+    """Write the files of the matrices; what other models are there stands beside the stiffness."""
+    found, lines = contents.model, []
+    others = [contents.name(model.matrices["stiffness"]) for model in contents.models[1:] if model.has_both]
+    for kind, unit in (("mass", "in kg"), ("stiffness", "in N/m"), ("damping", "in N s/m")):
+        if kind not in found.matrices:
+            continue
+        comments = [unit] if found.is_in_si else []
+        comments += ["told by the name of the file"] if kind in found.guessed and not found.is_in_si else []
+        comments = ["told by its size"] if kind in found.variables else comments
+        comments += [f"other models: {', '.join(others)}"] if others and kind == "stiffness" else []
+        line = f"{kind} = {quoted(contents.name(found.matrices[kind]))}"
+        lines.append(guessed(line, "; ".join(comments)) if comments else line)
+    if found.variables:
+        names = ", ".join(f"{kind} = {quoted(name)}" for kind, name in found.variables.items())
+        lines.append(f"variables = {{ {names} }}")
+    return lines

@@ -18,6 +18,7 @@ from frf_ipz.toml_files import parse_toml
 
 if TYPE_CHECKING:
     from frf_ipz.pipeline.init.folder_contents import FolderContents
+    from frf_ipz.pipeline.init.model_files import FoundModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,20 +93,30 @@ def _write(path: Path, text: str) -> bool:
 
 
 def _taken_for(contents: FolderContents) -> list[str]:
-    texts = []
-    if contents.has_matrices:
-        names = [contents.name(path) for path in dict.fromkeys(contents.matrices.values())]
-        texts.append(f"{', '.join(names)}: matrices of the FE model")
-    elif contents.matrices:
-        missing = [what for what in ("mass", "stiffness") if what not in contents.matrices]
-        missing += [] if contents.dof_table else ["dofs.csv, which names the rows"]
-        names = [contents.name(path) for path in contents.matrices.values()]
-        texts.append(f"{', '.join(names)}: matrices of an FE model; it needs also: {', '.join(missing)}")
-    if contents.dof_table is not None:
-        texts.append(f"{contents.name(contents.dof_table)}: rows of the matrices")
+    texts = [_of_model(contents)] if contents.model.matrices else []
+    if contents.model.rows is not None:
+        texts.append(f"{contents.name(contents.model.rows)}: rows of the matrices")
+    if contents.model.nodes is not None:
+        texts.append(f"{contents.name(contents.model.nodes)}: where the model's nodes are")
+    for model in contents.models[1:]:
+        if model.has_both:
+            texts.append(f"{_matrices(contents, model)}: matrices of another FE model, which is left out")
     texts += [] if contents.modes is None else [f"{contents.name(contents.modes)}: modes without FRFs"]
     if contents.geometry is not None:
         texts.append(f"{contents.name(contents.geometry)}: where the nodes are, for drawings")
     texts += [f"{contents.name(path)}: FRFs kept aside, no recording" for path in contents.references]
     texts += [f"{contents.name(path)}: left out, {reason}" for path, reason in contents.unread.items()]
     return texts
+
+
+def _of_model(contents: FolderContents) -> str:
+    model = contents.model
+    if model.is_complete:
+        return f"{_matrices(contents, model)}: matrices of the FE model"
+    missing = [what for what in ("mass", "stiffness") if what not in model.matrices]
+    missing += [] if model.rows or model.names_rows else ["dofs.csv, which names the rows"]
+    return f"{_matrices(contents, model)}: matrices of an FE model; it needs also: {', '.join(missing)}"
+
+
+def _matrices(contents: FolderContents, model: FoundModel) -> str:
+    return ", ".join(contents.name(path) for path in dict.fromkeys(model.matrices.values()))

@@ -34,7 +34,7 @@ def _read(request: MatrixRequest) -> StoredMatrix:
     path = request.path
     bulk = import_reader(path, "pyyeti.nastran.bulk", kind=KIND, extra="nastran")
     text = read_text(path)
-    names = list(dict.fromkeys(name.lower() for name in HEADER.findall(text)))
+    names = _names_in(text)
     if not names:
         raise FileFormatError(path, "has no header card of a DMIG matrix; punch it again, or export OUTPUT4")
     chosen = request.choose(dict.fromkeys(names))
@@ -51,4 +51,8 @@ def _read(request: MatrixRequest) -> StoredMatrix:
     return StoredMatrix(matrix=stored.matrix, dofs=dofs, notes=stored.notes)
 
 
-FORMAT = MatrixFormat(rank=4, fits=_fits, read=_read)
+FORMAT = MatrixFormat(rank=4, fits=_fits, read=_read, names=lambda path: _names_in(read_text(path)))
+
+
+def _names_in(text: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name.lower() for name in HEADER.findall(text)))

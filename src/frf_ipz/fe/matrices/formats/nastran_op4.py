@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.matrices.stored import (
@@ -19,25 +20,45 @@ from frf_ipz.foreign_errors import errors_of_reader, import_reader
 from frf_ipz.input_files import read_bytes
 from frf_ipz.output_files import write_bytes
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 KIND = "an OUTPUT4 file of Nastran"
 MOST_ROWS = 10**7
 
 
 def _read(request: MatrixRequest) -> StoredMatrix:
     path = request.path
-    op4 = import_reader(path, "pyyeti.nastran.op4", kind=KIND, extra="nastran")
-    with TemporaryDirectory() as folder, errors_of_reader(path, KIND):  # pyyeti takes paths
-        copy = Path(folder) / "matrices.op4"
-        write_bytes(copy, read_bytes(path, most_bytes=MOST_BYTES))
-        _, sizes, *_ = op4.dir(str(copy), verbose=False)
-        if any(max(size) > MOST_ROWS for size in sizes):
-            raise FileFormatError(path, f"says that a matrix has more than {MOST_ROWS} rows; is it damaged?")
-        names, matrices, *_ = op4.load(str(copy), into="list", sparse=True)
+    with _copied(path) as (op4, copy):
+        _sizes(path, op4, copy)
+        names, matrices, *_ = op4.load(copy, into="list", sparse=True)
     known = _square(names, matrices, request.order)
     return both_triangles(as_matrix(known[request.choose(known)], request), path)
 
 
-FORMAT = MatrixFormat(rank=3, fits=lambda path, head: path.suffix.lower() == ".op4", read=_read)  # noqa: ARG005
+def _names(path: Path) -> tuple[str, ...]:
+    with _copied(path) as (op4, copy):
+        return tuple(dict.fromkeys(name for name, size in _sizes(path, op4, copy) if len(set(size)) == 1))
+
+
+FORMAT = MatrixFormat(rank=3, fits=lambda path, head: path.suffix.lower() == ".op4", read=_read, names=_names)  # noqa: ARG005
+
+
+@contextmanager
+def _copied(path: Path) -> Iterator[tuple[Any, str]]:
+    """Give pyyeti, which takes paths, a copy that is checked and unpacked."""
+    op4 = import_reader(path, "pyyeti.nastran.op4", kind=KIND, extra="nastran")
+    with TemporaryDirectory() as folder, errors_of_reader(path, KIND):
+        copy = Path(folder) / "matrices.op4"
+        write_bytes(copy, read_bytes(path, most_bytes=MOST_BYTES))
+        yield op4, str(copy)
+
+
+def _sizes(path: Path, op4: Any, copy: str) -> list[tuple[str, tuple[int, int]]]:  # noqa: ANN401 - a module
+    names, sizes, *_ = op4.dir(copy, verbose=False)
+    if any(max(size) > MOST_ROWS for size in sizes):
+        raise FileFormatError(path, f"says that a matrix has more than {MOST_ROWS} rows; is it damaged?")
+    return list(zip(names, sizes, strict=True))
 
 
 def _square(names: list[str], matrices: list[Any], order: int | None) -> dict[str, Any]:
