@@ -256,3 +256,24 @@ def test_a_part_has_the_order_of_the_whole_and_another_model_its_own(tmp_path):
     assert 'name = "tip"\nstiffness = "K_tip.npz"\nmass = "M_tip.npz"' in text
     assert 'name = "old"' not in text
     assert "K_old.npz, M_old.npz: matrices of another FE model, which is left out" in said
+
+
+def test_neither_zeros_nor_what_is_not_symmetric_is_taken_for_a_matrix_of_the_structure(tmp_path):
+    model = beam(left="clamped", elements=5)
+    write_odd_op4(tmp_path, model)
+    order = len(model.dofs)
+    matrices = {"A0": np.zeros((order, order)), "A1": model.stiffness.toarray(), "A2": model.mass.toarray()}
+    matrices["T"] = 1e12 * np.triu(np.ones((order, order))) + np.tril(np.ones((order, order)))
+    library("pyyeti.nastran.op4", "nastran").write(str(tmp_path / "plate.op4"), matrices)
+    text, _ = found_in(tmp_path)
+    assert 'variables = { stiffness = "a1", mass = "a2" }' in text
+
+
+def test_damping_beside_both_is_found_and_a_table_with_other_rows_is_marked(tmp_path):
+    model = beam(left="clamped", elements=5)
+    matrices = {"KAA": model.stiffness.toarray(), "MAA": model.mass.toarray(), "BAA": 1e-6 * model.stiffness.toarray()}
+    library("pyyeti.nastran.op4", "nastran").write(str(tmp_path / "plate.op4"), matrices)
+    (tmp_path / "dofs.csv").write_text("node,direction,x_m,y_m,z_m\n1,x,0,0,0\n")
+    text, _ = found_in(tmp_path)
+    assert 'damping = "plate.op4"\n' in text
+    assert "has other rows than the matrices   CHECK" in text

@@ -16,12 +16,13 @@ import numpy as np
 from scipy.sparse import linalg
 
 from frf_ipz.dofs import GENERALISED
-from frf_ipz.errors import FileFormatError
+from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.fe.matrices.registry import matrix_names, read_matrix
 from frf_ipz.fe.matrices.row_tables import read_rows
 from frf_ipz.fe.matrices.stored import NAMES, MatrixRequest
 from frf_ipz.input_files import open_input, read_bytes
 from frf_ipz.meshes.registry import read_mesh
+from frf_ipz.numerics.definiteness import symmetrise
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -274,13 +275,23 @@ def _of_files_without_names(paths: Mapping[str, Path]) -> list[FoundModel]:
 
 
 def _told_apart(stored: Mapping[str, StoredMatrix]) -> dict[str, str]:
-    """Take the largest of matrices of one order for the stiffness, the smallest for the mass."""
-    orders = [item.matrix.shape[0] for item in stored.values()]
+    """Take the largest of the symmetric matrices of one order for the stiffness, the smallest for the mass."""
+    candidates = {name: item.matrix for name, item in stored.items() if _may_be_of_a_structure(item)}
+    orders = [matrix.shape[0] for matrix in candidates.values()]
     order = max(orders, key=lambda order: (orders.count(order), order), default=0)
-    sizes = {name: float(linalg.norm(item.matrix)) for name, item in stored.items() if item.matrix.shape[0] == order}
+    sizes = {name: float(linalg.norm(matrix)) for name, matrix in candidates.items() if matrix.shape[0] == order}
     if len(sizes) < 2:
         return {}
     return {"stiffness": max(sizes, key=lambda name: sizes[name]), "mass": min(sizes, key=lambda name: sizes[name])}
+
+
+def _may_be_of_a_structure(stored: StoredMatrix) -> bool:
+    """Leave out transformations, loads and matrices of zeros that an export has too."""
+    try:
+        symmetrise(stored.matrix)
+    except InputError:
+        return False
+    return bool(stored.matrix.diagonal().real.sum() > 0)
 
 
 def _of_arrays(files: Sequence[Path]) -> list[FoundModel]:
