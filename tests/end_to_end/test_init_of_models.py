@@ -1,6 +1,7 @@
 """`init` finds the model of an FE program in a folder, and the model file that it writes is read."""
 
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy import sparse
 
 from fe_models import beam
 from frf_ipz.dofs import DIRECTIONS
+from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.model_file import read_model
 from frf_ipz.pipeline.init.folder_contents import look_into
 from frf_ipz.pipeline.init.model_draft import draft_model
@@ -277,3 +279,24 @@ def test_damping_beside_both_is_found_and_a_table_with_other_rows_is_marked(tmp_
     text, _ = found_in(tmp_path)
     assert 'damping = "plate.op4"\n' in text
     assert "has other rows than the matrices   CHECK" in text
+
+
+@pytest.mark.parametrize(("write", "name"), [(write_dmig, "plate.pch"), (write_op4, "plate.op4")])
+def test_a_model_whose_reader_is_missing_is_found_nevertheless(tmp_path, monkeypatch, write, name):
+    write(tmp_path, beam(left="clamped", elements=5))
+    for module in [known for known in sys.modules if known.partition(".")[0] == "pyyeti"]:
+        monkeypatch.setitem(sys.modules, module, None)
+    text, said = found_in(tmp_path)
+    assert f'stiffness = "{name}"' in text
+    assert f"{name}: matrices of the FE model" in said
+    with pytest.raises(FileFormatError, match=r"frf_ipz\[nastran\]"):
+        read_model(tmp_path / "model.toml")
+
+
+def test_what_a_solver_printed_beside_its_matrices_is_passed_over(tmp_path):
+    write_calculix(tmp_path, beam(left="clamped", elements=5))
+    for name in ("job.dat", "shaker.dat"):
+        (tmp_path / name).write_text("")
+    _, said = found_in(tmp_path)
+    assert "shaker.dat: left out" in said
+    assert "job.dat" not in said

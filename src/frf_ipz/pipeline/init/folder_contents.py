@@ -101,6 +101,7 @@ def look_into(folder: Path) -> FolderContents:
     places = [path for path in files if path.suffix.lower() == CSV and _columns(path) in PLACE_COLUMNS]
     models = find_models(files, dof_tables, places)
     of_models = {path for model in models for path in model.paths}
+    jobs = {path.with_suffix("") for path in of_models}  # what a solver printed has the name of its deck
     geometries = [path for path in files if path.suffix.lower() in UNIVERSAL and holds_geometry(path)]
     found: dict[str, list[Path]] = {"recording": [], "frf": []}
     unread: dict[Path, str] = {}
@@ -115,7 +116,7 @@ def look_into(folder: Path) -> FolderContents:
         try:
             kind = _kind(path)
         except FileFormatError as error:
-            if path in geometries:
+            if path in geometries or path.with_suffix("") in jobs:
                 continue
             tables += [error] if path.suffix.lower() == CSV else []
             unread[path] = str(error).partition(": ")[2]

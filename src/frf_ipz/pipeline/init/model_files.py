@@ -39,6 +39,7 @@ TEXTS_OF_ONE = {*ONE_MATRIX, *TITLED, ".mtx"}
 TITLE = 72  # columns
 NASTRAN = {".op4", ".pch", ".dmig", ".bdf", ".dat", ".nas", ".bulk", ".blk"}  # may hold matrices by name
 FULL, OUTPUT4 = ".full", ".op4"
+NAMING = (NASTRAN - {OUTPUT4}) | {FULL}  # say what their rows are
 ARRAYS = {".npz", ".npy"}  # matrices where they are called so, else recordings or FRFs
 ARRAYS_OF_BOTH = {".mat", ".npz"}
 HEAD_BYTES = 4096
@@ -314,7 +315,7 @@ def _with_rows_and_nodes(model: FoundModel, tables: Sequence[Path], meshes: Sequ
     model = replace(
         model,
         is_in_si=_suffix(path) in IN_SI or (_suffix(path) == ".mtx" and _is_matrix_market(path)),
-        names_rows=path.suffix.lower() == FULL if stored is None else stored.dofs is not None,
+        names_rows=path.suffix.lower() in NAMING if stored is None else stored.dofs is not None,
     )
     by_distance = sorted(tables, key=lambda table: _distance(table, model))
     rows = _rows(model, stored, by_distance)
