@@ -4,8 +4,14 @@ import shutil
 from pathlib import Path
 
 from frf_ipz.pipeline.run import run_pipeline
+from made_once import made_once
 
 ROOT = Path(__file__).parents[1]
+
+
+def made_demo(tmp_path_factory):
+    """The folder of the demo, for all tests of a session: to be read, or copied."""
+    return made_once(tmp_path_factory, "demo", make_demo)
 
 
 def make_demo(folder):

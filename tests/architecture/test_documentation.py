@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import frf_ipz
-from demo_case import make_demo
+from demo_case import made_demo
 from frf_ipz import plotting
 from frf_ipz.fe.model_file import model_kinds
 from frf_ipz.fleet.fleet_file import FleetFile
@@ -41,7 +41,7 @@ def reference():
 
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory):
-    return make_demo(tmp_path_factory.mktemp("documented")) / "out"
+    return made_demo(tmp_path_factory) / "out"
 
 
 def dataclasses_in(hint):

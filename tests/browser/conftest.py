@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from demo_case import make_demo
+from demo_case import copy_demo, made_demo
 from served_page import served
 
 HOW = "(Debian: apt-get install chromium chromium-driver; pip install selenium)"
@@ -43,7 +43,7 @@ def nothing_of_other_tests(browser):
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
-    return make_demo(tmp_path_factory.mktemp("served"))
+    return copy_demo(made_demo(tmp_path_factory), tmp_path_factory.mktemp("served"))
 
 
 @pytest.fixture(scope="module")

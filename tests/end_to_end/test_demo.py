@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import frf_ipz
+from demo_case import copy_demo, made_demo
 
 ROOT = Path(__file__).parents[2]
 CONTRACT = {
@@ -32,9 +33,18 @@ def demo():
     return module
 
 
+@pytest.fixture(scope="module", params=["no causes looked for", pytest.param("as it stands", marks=pytest.mark.slow)])
+def pipeline(request, tmp_path_factory):
+    """Pipeline file and folder of results: as it stands most of its time goes into the search for causes."""
+    if request.param == "as it stands":
+        return ROOT / "pipelines" / "cantilever.toml", tmp_path_factory.mktemp("demo") / "out"
+    folder = copy_demo(made_demo(tmp_path_factory), tmp_path_factory.mktemp("demo"))
+    return folder / "pipeline.toml", folder / "out"
+
+
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    return frf_ipz.run_pipeline(ROOT / "pipelines" / "cantilever.toml", tmp_path_factory.mktemp("demo") / "out")
+def run(pipeline):
+    return frf_ipz.run_pipeline(*pipeline)
 
 
 def test_the_point_of_interest_is_predicted(demo, run):
@@ -88,9 +98,9 @@ def test_the_state_space_reproduces_the_prediction(run):
     assert np.abs(values - prediction.values[:, 0]).max() < 1e-6 * scale  # rounding of the modal form
 
 
-def test_a_second_run_computes_nothing(run):
+def test_a_second_run_computes_nothing(run, pipeline):
     before = json.loads((run.path / "run.json").read_text())["stages"]
-    frf_ipz.run_pipeline(ROOT / "pipelines" / "cantilever.toml", run.path)
+    frf_ipz.run_pipeline(*pipeline)
     assert json.loads((run.path / "run.json").read_text())["stages"] == before
 
 

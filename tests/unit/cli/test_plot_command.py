@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from demo_case import make_demo
+from demo_case import made_demo
 from frf_ipz.cli import main as command
 
 KINDS = {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}
@@ -13,7 +13,7 @@ OF_DIAGNOSIS = {"mismatch", "ranking", "proof", "law", "levels"}
 
 @pytest.fixture(scope="module")
 def out(tmp_path_factory):
-    return make_demo(tmp_path_factory.mktemp("demo")) / "out"
+    return made_demo(tmp_path_factory) / "out"
 
 
 @pytest.fixture

@@ -1,11 +1,11 @@
 import pytest
 
-from demo_case import copy_demo, make_demo
+from demo_case import copy_demo, made_demo
 
 
 @pytest.fixture(scope="session")
 def original(tmp_path_factory):
-    return make_demo(tmp_path_factory.mktemp("made"))
+    return made_demo(tmp_path_factory)
 
 
 @pytest.fixture
