@@ -20,38 +20,39 @@ SWEEPS = 30  # over rows and columns
 
 
 def fit_products(matrix: ComplexArray | FloatArray, weight: FloatArray, rank: int) -> tuple[ComplexArray, ComplexArray]:
-    """Find the sum of products of two vectors, ``rows @ columns.T``, that fits a matrix best.
+    """Find the sum of products of two vectors, ``rows @ columns.T``, that fits a matrix best; of many at once.
 
     Parameters
     ----------
-    matrix : (n_rows, n_columns) complex or real array
+    matrix : (..., n_rows, n_columns) complex or real array
         What is fitted.
-    weight : (n_rows, n_columns) array
+    weight : (..., n_rows, n_columns) array
         Of the square of each entry's misfit; 0 where there is no entry.
     rank : int
         Number of products.
 
     Returns
     -------
-    rows : (n_rows, rank) complex array
+    rows : (..., n_rows, rank) complex array
         Left vectors; 0 in rows without weight.
-    columns : (n_columns, rank) complex array
+    columns : (..., n_columns, rank) complex array
         Right vectors; 0 in columns without weight.
     """
     present = np.where(weight > 0, matrix, 0.0)
     log_weight = np.log(np.where(weight > 0, weight, 1.0)) / 2
-    by_row, by_column = (np.exp(log_weight.mean(axis=axis, keepdims=True) - log_weight.mean() / 2) for axis in (1, 0))
-    columns = np.linalg.svd(present * by_row * by_column, full_matrices=False)[2][:rank].T / by_column.T
-    rows = np.zeros((len(matrix), rank), complex)
+    mean = log_weight.mean(axis=(-2, -1), keepdims=True)
+    by_row, by_column = (np.exp(log_weight.mean(axis=axis, keepdims=True) - mean / 2) for axis in (-1, -2))
+    right = np.linalg.svd(present * by_row * by_column, full_matrices=False)[2]
+    columns = (right[..., :rank, :] / by_column).mT
     for _ in range(SWEEPS):
         rows = _fit_rows(present, weight, columns)
-        columns = _fit_rows(present.T, weight.T, np.linalg.qr(rows)[0])
+        columns = _fit_rows(present.mT, weight.mT, np.linalg.qr(rows)[0])
         columns = np.linalg.qr(columns)[0]
     return _fit_rows(present, weight, columns), columns
 
 
 def _fit_rows(matrix: ComplexArray | FloatArray, weight: FloatArray, columns: ComplexArray) -> ComplexArray:
     """Coefficients of each row in the columns."""
-    normal = np.einsum("ij,jr,jq->irq", weight, columns.conj(), columns)
-    right = np.einsum("ij,jr->ir", weight * matrix, columns.conj())
+    normal = np.einsum("...ij,...jr,...jq->...irq", weight, columns.conj(), columns)
+    right = np.einsum("...ij,...jr->...ir", weight * matrix, columns.conj())
     return np.asarray((np.linalg.pinv(normal, hermitian=True) @ right[..., None])[..., 0])

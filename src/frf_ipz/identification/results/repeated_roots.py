@@ -64,10 +64,7 @@ def _of_rank_two(products: ComplexArray, variance: FloatArray, n_lines: int) -> 
     """Find modes whose second product exceeds the noise of each entry, and what others have, as the BIC demands."""
     n_outputs, n_inputs = products.shape[1:]
     weights = 1 / np.maximum(variance, np.finfo(float).tiny)
-    one, two = (
-        np.array([_misfit(matrix, weight, rank) for matrix, weight in zip(products, weights, strict=True)])
-        for rank in (1, 2)
-    )
+    one, two = (_misfits(products, weights, rank) for rank in (1, 2))
     total = np.sum(weights * np.abs(products) ** 2, axis=(1, 2))
     relative = one / total
     others = [
@@ -78,10 +75,10 @@ def _of_rank_two(products: ComplexArray, variance: FloatArray, n_lines: int) -> 
     return np.flatnonzero(2 * (one - two) / level > demanded)
 
 
-def _misfit(matrix: ComplexArray, weight: FloatArray, rank: int) -> float:
-    """Weighted sum of squares that products leave."""
-    rows, columns = fit_products(matrix, weight, rank)
-    return float(np.sum(weight * np.abs(matrix - rows @ columns.T) ** 2))
+def _misfits(matrices: ComplexArray, weights: FloatArray, rank: int) -> FloatArray:
+    """Weighted sum of squares that products leave of each matrix."""
+    rows, columns = fit_products(matrices, weights, rank)
+    return np.asarray(np.sum(weights * np.abs(matrices - rows @ columns.mT) ** 2, axis=(1, 2)))
 
 
 def _two_products(matrix: ComplexArray, driving: list[tuple[int, int]]) -> list[ComplexArray]:
