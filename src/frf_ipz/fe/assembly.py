@@ -52,10 +52,15 @@ def assemble(shares: Iterable[tuple[IntArray, FloatArray | Matrix]], n_all: int)
     """
     rows, columns, values = [], [], []
     for indices, share in shares:
-        local = sparse.coo_array(share)
-        rows.append(indices[local.row])
-        columns.append(indices[local.col])
-        values.append(local.data)
+        if isinstance(share, np.ndarray):  # as most are: of a few DOFs
+            row, column = share.nonzero()
+            data = share[row, column]
+        else:
+            local = sparse.coo_array(share)
+            row, column, data = local.row, local.col, local.data
+        rows.append(indices[row])
+        columns.append(indices[column])
+        values.append(data)
     if not rows:
         return sparse.csr_array((n_all, n_all), dtype=np.float64)
     triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))

@@ -279,7 +279,8 @@ def split_line(line: str, delimiter: str) -> list[str]:
     """
     if delimiter == " ":
         return [field.strip('"') for field in line.split()] or [""]
-    fields = next(csv.reader([line.replace("\r", " ")], delimiter=delimiter), [])
+    line = line.replace("\r", " ")
+    fields = next(csv.reader([line], delimiter=delimiter), []) if '"' in line else line.split(delimiter)
     return [field.strip() for field in fields] or [""]
 
 
@@ -315,14 +316,15 @@ def _check_text(path: Path, head: bytes) -> None:
 def _split_lines(data: bytes) -> tuple[list[int], list[str]]:
     """Give the byte that each line begins at, and its text."""
     begins = len(BOM) if data.startswith(BOM) else 0
+    text = data.decode("ascii") if data.isascii() else None  # the whole of it is faster than line by line
     offsets, lines = [], []
     for match in NEWLINE.finditer(data, begins):
         offsets.append(begins)
-        lines.append(decode(data[begins : match.start()]))
+        lines.append(decode(data[begins : match.start()]) if text is None else text[begins : match.start()])
         begins = match.end()
     if begins < len(data):
         offsets.append(begins)
-        lines.append(decode(data[begins:]))
+        lines.append(decode(data[begins:]) if text is None else text[begins:])
     return offsets, lines
 
 
