@@ -59,9 +59,10 @@ def _get(bench, path):
 
 
 def _draw_all(folder):
-    for name in picture_list(folder).splitlines()[1:]:
+    names, run = picture_list(folder).splitlines()[1:], open_results(folder)
+    for name in names:
         with suppress(FrfIpzError), errors_of_results(folder):
-            describe(name, open_results(folder))
+            describe(name, run)
 
 
 def _no_pipeline(path):

@@ -66,10 +66,16 @@ def written(tmp_path_factory):
 
 
 @pytest.fixture
-def page(browser, written):
-    yield open_page(browser, written)
+def screen(browser):
+    """The browser without a page: of another width or theme for one test."""
+    yield browser
     browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
+
+
+@pytest.fixture
+def page(screen, written):
+    return open_page(screen, written)
 
 
 def resize(page, width, height=900):
@@ -124,19 +130,19 @@ def test_ticks_of_frequency_axes_are_whole_numbers_and_few(page, zoom):
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_nothing_is_wider_than_a_narrow_screen(browser, written, page, theme):
-    resize(page, 390)
-    prefer(page, theme)
-    open_page(browser, written)
+def test_nothing_is_wider_than_a_narrow_screen(screen, written, theme):
+    resize(screen, 390)
+    prefer(screen, theme)
+    page = open_page(screen, written)
     assert page.execute_script("return document.documentElement.scrollWidth") <= 390
     assert page.execute_script(FRAME) == []
     assert page.execute_script(OUTSIDE) == []
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_all_that_is_written_stands_out_from_what_is_behind_it(browser, written, page, theme):
-    prefer(page, theme)
-    open_page(browser, written)
+def test_all_that_is_written_stands_out_from_what_is_behind_it(screen, written, theme):
+    prefer(screen, theme)
+    page = open_page(screen, written)
     contrasts = page.execute_script(CONTRASTS)
     assert len(contrasts) > 300
     assert [(text, ratio) for text, ratio in contrasts if ratio < LEAST_CONTRAST] == []

@@ -52,19 +52,23 @@ def assemble(shares: Iterable[tuple[IntArray, FloatArray | Matrix]], n_all: int)
     """
     rows, columns, values = [], [], []
     for indices, share in shares:
-        if isinstance(share, np.ndarray):  # as most are: of a few DOFs
-            row, column = share.nonzero()
-            data = share[row, column]
-        else:
-            local = sparse.coo_array(share)
-            row, column, data = local.row, local.col, local.data
+        row, column, value = _entries(share)
         rows.append(indices[row])
         columns.append(indices[column])
-        values.append(data)
+        values.append(value)
     if not rows:
         return sparse.csr_array((n_all, n_all), dtype=np.float64)
     triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     return sparse.csr_array(sparse.coo_array(triplets, shape=(n_all, n_all), dtype=np.float64))
+
+
+def _entries(share: FloatArray | Matrix) -> tuple[IntArray, IntArray, FloatArray]:
+    """Rows, columns and values of what is not zero."""
+    if isinstance(share, np.ndarray):  # as most are: of a few DOFs
+        row, column = share.nonzero()
+        return row, column, np.asarray(share[row, column])
+    local = sparse.coo_array(share)
+    return np.asarray(local.row, np.intp), np.asarray(local.col, np.intp), np.asarray(local.data)
 
 
 def assemble_mass_and_stiffness(parts: Iterable[Part], n_all: int) -> tuple[Matrix, Matrix]:

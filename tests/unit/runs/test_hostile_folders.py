@@ -27,7 +27,9 @@ ALIKE = (
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory):
-    return write_folder(tmp_path_factory.mktemp("good") / "results")
+    folder = write_folder(tmp_path_factory.mktemp("good") / "results")
+    look(folder, tmp_path_factory.mktemp("out"))  # what looking loads once is there in every copy of this process
+    return folder
 
 
 def _look(folder, out):

@@ -46,7 +46,9 @@ def integrate(force):
         return np.concatenate([p, load - 2 * RATIO * OMEGA * p - OMEGA**2 * q])
 
     time = np.arange(250) / 500.0
-    done = solve_ivp(derivative, (0, 0.5), np.zeros(6), t_eval=time, rtol=1e-8, atol=1e-11, max_step=1e-3)
+    done = solve_ivp(
+        derivative, (0, 0.5), np.zeros(6), method="DOP853", t_eval=time, rtol=1e-8, atol=1e-11, max_step=1e-3
+    )
     return SHAPES[1] @ done.y[:3]
 
 
