@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import PortDof
     from frf_ipz.frf import FrfSet
     from frf_ipz.ingest.campaign import VibrationTest
+    from frf_ipz.ingest.frf_estimate import FrfEstimate, Trace
     from frf_ipz.pipeline.config import Pipeline
     from frf_ipz.structure import StructuralModel
 
@@ -95,6 +96,10 @@ class PipelineInputs:
             "model_file": Path(next(iter(self.model_names), "FE model")).name,
             "is_recorded": self.test.kind not in {"frf", "modes"},
         }
+
+    def impacts(self, estimate: FrfEstimate) -> tuple[Trace, ...]:
+        """Traces of impacts: only of these it is known what force and response look like."""
+        return estimate.traces if self.test.kind == "hammer" else ()
 
 
 class PlacesOfMistakes(TypedDict):

@@ -49,6 +49,7 @@ FLAT = 1e-4  # of the logarithm of the evidence: what a further step would gain 
 MAX_HALVINGS = 10
 CONTRACTING = 0.25  # of the gain of the step before: beyond it a curvature from farther away costs steps
 ROWS_AT_ONCE = 4096
+DRAWS_OF_A_SCALE = 4  # of parameters, on average, for each draw of their terms' standard deviations
 ROWS_OF_A_TILE = 128  # when a matrix is mirrored: both tiles stay in the cache
 ALIKE = 1e-4  # relative, of the noise of each datum: none is known as well
 LARGEST_SHARES = 1e3  # in a mixture: what rounding may grow by
@@ -642,8 +643,8 @@ def most_contradicted(linear: Linearised, scales: FloatArray, limit: float, *, l
 
 
 def draw_posterior(
-    step: GaussianStep,
     linear: Linearised,
+    terms: Sequence[PriorTerm],
     scales: FloatArray,
     noise: TargetNoise,
     rng: np.random.Generator,
@@ -651,16 +652,19 @@ def draw_posterior(
     *,
     factor: float,
 ) -> FloatArray:
-    """Draw whitened parameters from the posterior: a draw of the prior, corrected by its data.
+    """Draw whitened parameters from the posterior: draws of the prior, corrected by their data.
+
+    What the data leave open of the terms' standard deviations is open in the draws too: few data tell these hardly
+    better than to a factor of two, and those that are the most likely alone give bands that are too narrow.
 
     Parameters
     ----------
-    step : GaussianStep
-        The posterior.
     linear : Linearised
         The data.
+    terms : sequence of PriorTerm
+        The terms.
     scales : (t,) array
-        Standard deviations of the terms.
+        Their most likely standard deviations.
     noise : TargetNoise
         Of the data, with their slack.
     rng : Generator
@@ -673,18 +677,52 @@ def draw_posterior(
     Returns
     -------
     (count, k) array
-        Draws.
+        Draws, in units of `scales`.
     """
-    prior = rng.standard_normal((count, len(step.mean)))
-    chosen = linear.combined(prior)
+    prior = rng.standard_normal((count, sum(term.root.shape[1] for term in terms)))
     errors = linear.rotated(noise.draw(rng.standard_normal((count, len(linear.data)))).T)
-    n_common = linear.ends[0]
-    weights = 1 / (linear.level + factor**2)
-    factors, columns = linear.factors(scales)[:, None], linear.joined[:, : linear.ends[-1]]
-    pretended = columns[:, n_common:] @ (factors[n_common:] * chosen.T) + errors
-    right = factors * (columns.T @ (weights[:, None] * pretended))
-    correction = cho_solve((step.root, False), right, check_finite=False)[n_common:]
-    return np.asarray(step.mean + prior - linear.whole(correction.T))
+    chosen, n_common, weights = linear.combined(prior), linear.ends[0], 1 / (linear.level + factor**2)
+    columns = linear.joined[:, : linear.ends[-1]]
+    drawn = np.empty_like(prior)
+    for evidence, members in _drawn_scales(linear, terms, scales, factor, rng, count):
+        factors = linear.factors(evidence.scales)[:, None]
+        pretended = columns[:, n_common:] @ (factors[n_common:] * chosen[members].T) + errors[:, members]
+        right = factors * (columns.T @ (weights[:, None] * pretended))
+        correction = cho_solve((evidence.root, False), right, check_finite=False)
+        changed = evidence.mean[n_common:, None] - correction[n_common:]
+        sizes = [term.root.shape[1] for term in terms]
+        drawn[members] = (prior[members] + linear.whole(changed.T)) * np.repeat(evidence.scales / scales, sizes)
+    return drawn
+
+
+def _drawn_scales(
+    linear: Linearised,
+    terms: Sequence[PriorTerm],
+    scales: FloatArray,
+    factor: float,
+    rng: np.random.Generator,
+    count: int,
+) -> Iterator[tuple[_Evidence, IntArray]]:
+    """Share draws out among standard deviations of the terms, in proportion to the evidence of these.
+
+    They are drawn about the most likely ones with the expected curvature of the evidence, in opposite pairs, and taken
+    by their evidence over that of the draw (sampling-importance resampling).
+    """
+    search = _ScaleSearch(linear, terms, np.array([term.scale_uncertainty > 0 for term in terms]), scales, factor)
+    center = np.log(scales)[search.free]
+    top = search.evaluate(center)
+    if not len(center) or not len(linear.data) or not count:
+        yield top, np.arange(count)
+        return
+    root = np.linalg.cholesky(top.curvature())
+    white = rng.standard_normal(((count + DRAWS_OF_A_SCALE - 1) // DRAWS_OF_A_SCALE, len(center)))
+    white[len(white) // 2 :] = -white[: len(white) - len(white) // 2]
+    tried = [search.evaluate(logs) for logs in center + np.linalg.solve(root.T, white.T).T]
+    logs_of_weights = 0.5 * np.sum(white**2, axis=1) - np.array([evidence.value for evidence in tried])
+    shares = np.cumsum(np.exp(logs_of_weights - logs_of_weights.max()))
+    owners = np.searchsorted(shares, (np.arange(count) + 0.5) / count * shares[-1])
+    for owner in np.unique(owners).tolist():
+        yield tried[owner], np.flatnonzero(owners == owner)
 
 
 def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: FloatArray) -> FloatArray:
@@ -741,32 +779,50 @@ def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: Fl
     return scales
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _ScaleSearch:
-    """Minus the logarithm of the evidence, by the logarithms of the free scales."""
+    """Minus the logarithm of the evidence, by the logarithms of the free scales.
+
+    Without a term for the slack, the factor on it is held.
+    """
 
     linear: Linearised
     terms: Sequence[PriorTerm]
     free: BoolArray
     start: FloatArray
+    held: float = 0.0
 
     @property
     def _center(self) -> FloatArray:
         return np.log([term.std for term in self.terms])[self.free]
 
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Prior covariance of the logarithms: an own part of each, and what all share."""
+        own, shared = (
+            np.array([getattr(term, name) for term in self.terms])[self.free]
+            for name in ("scale_uncertainty", "shared_uncertainty")
+        )
+        return np.asarray(np.diag(own**2) + np.outer(shared, shared))
+
+    @cached_property
+    def precision(self) -> FloatArray:
+        """Its inverse."""
+        return np.asarray(np.linalg.inv(self.covariance))
+
     @property
-    def _spread(self) -> FloatArray:
-        return np.array([term.scale_uncertainty for term in self.terms])[self.free]
+    def _reach(self) -> FloatArray:
+        return np.asarray(MAX_DEVIATION * np.sqrt(np.diagonal(self.covariance)))
 
     @property
     def low(self) -> FloatArray:
         """Least logarithms."""
-        return np.asarray(self._center - MAX_DEVIATION * self._spread)
+        return np.asarray(self._center - self._reach)
 
     @property
     def high(self) -> FloatArray:
         """Largest logarithms."""
-        return np.asarray(self._center + MAX_DEVIATION * self._spread)
+        return np.asarray(self._center + self._reach)
 
     def step(self, logs: FloatArray, slope: FloatArray, curvature: FloatArray) -> FloatArray:
         """Newton's step of the scales that are not at an end of their range."""
@@ -783,20 +839,20 @@ class _ScaleSearch:
         scales[self.free] = np.exp(logs)
         linear, count = self.linear, len(self.linear.bases)
         has_slack = len(self.terms) > count
-        factor = float(scales[-1]) if has_slack else 0.0
+        factor = float(scales[-1]) if has_slack else self.held
         root, right = linear.information(scales[:count], factor)
         mean = cho_solve((root, False), right, check_finite=False)
         weights = 1 / (linear.level + factor**2)
         value = 0.5 * float(weights @ linear.data**2 - right @ mean) + float(np.log(np.diagonal(root)).sum())
-        deviation = (logs - self._center) / self._spread
-        value += 0.5 * float(deviation @ deviation) - 0.5 * float(np.log(weights).sum())
+        pull = self.precision @ (logs - self._center)
+        value += 0.5 * float(pull @ (logs - self._center)) - 0.5 * float(np.log(weights).sum())
         return _Evidence(
             value=value,
             search=self,
             scales=scales[:count],
             factor=factor,
             of_slack=has_slack and bool(self.free[-1]),
-            deviation=deviation,
+            pull=pull,
             root=root,
             mean=mean,
             weights=weights,
@@ -812,7 +868,7 @@ class _Evidence:
     scales: FloatArray
     factor: float
     of_slack: bool
-    deviation: FloatArray
+    pull: FloatArray
     root: FloatArray
     mean: FloatArray
     weights: FloatArray
@@ -851,7 +907,7 @@ class _Evidence:
             error = np.append(-self.mean, 1.0)
             misfit = float(error @ self._by_slack @ error)
             slope[-1] = self.factor**2 * (float(self.weights.sum()) * (1 - self._share) - misfit)
-        return np.asarray(slope[search.free] + self.deviation / search._spread)
+        return np.asarray(slope[search.free] + self.pull)
 
     def curvature(self) -> FloatArray:
         """Give the expected curvature."""
@@ -865,7 +921,7 @@ class _Evidence:
             curvature[number, number] += 2 * float(size - 2 * np.trace(covariance[place, place]))
         if self.of_slack:
             curvature[-1] = curvature[:, -1] = self._row_of_slack()
-        return np.asarray(curvature[np.ix_(search.free, search.free)] + np.diag(1 / search._spread**2))
+        return np.asarray(curvature[np.ix_(search.free, search.free)] + search.precision)
 
     def _row_of_slack(self) -> FloatArray:
         square, told = self.factor**2, self._by_slack[:-1, :-1]

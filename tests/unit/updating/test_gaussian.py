@@ -92,14 +92,52 @@ def test_a_matrix_is_split_into_its_blocks(many):
     assert_allclose(np.array(blocks), np.array(noise.blocks))
 
 
+def held(count):
+    """A term whose standard deviation is known."""
+    return PriorTerm(name="held", root=np.eye(count), std=1.0, scale_uncertainty=0.0)
+
+
 def test_draws_have_the_posterior_mean_and_covariance(problem):
     sensitivity, data, noise = problem
-    linear, scales = linearise([sensitivity], data, noise_of(noise)), np.ones(1)
-    step = solve_step(linear, scales)
-    members = draw_posterior(step, linear, scales, noise_of(noise), np.random.default_rng(1), DRAWS, factor=0.0)
+    linear, terms = linearise([sensitivity], data, noise_of(noise)), [held(sensitivity.shape[1])]
+    members = draw_posterior(linear, terms, np.ones(1), noise_of(noise), np.random.default_rng(1), DRAWS, factor=0.0)
     mean, covariance = posterior(*problem)
     assert np.abs(members.mean(0) - mean).max() < SAMPLED
     assert np.abs(np.cov(members.T) - covariance).max() < SAMPLED * covariance.max()
+
+
+def test_draws_leave_open_what_the_data_leave_open_of_the_scales():
+    """Two terms and few data: the mixture over a fine grid of both scales, by its evidence, is what draws must have."""
+    rng = np.random.default_rng(12)
+    parts = [rng.standard_normal((5, 2)), rng.standard_normal((5, 3))]
+    data, noise = rng.standard_normal(5), 0.3 * np.eye(5)
+    terms = [
+        PriorTerm(name=str(k), root=np.eye(part.shape[1]), std=0.5, shared_uncertainty=1.0)
+        for k, part in enumerate(parts)
+    ]
+    linear = linearise(parts, data, noise_of(noise))
+    scales = most_likely_scales(linear, terms, np.full(2, 0.5))
+    members = draw_posterior(linear, terms, scales, noise_of(noise), np.random.default_rng(1), DRAWS // 8, factor=0.0)
+    members = members * np.repeat(scales, [2, 3])
+    logs = np.linspace(-5.0, 4.0, 31)
+    precision = np.linalg.inv(np.array([[2.0, 1.0], [1.0, 2.0]]))
+    weights, means, squares = [], [], []
+    for first in logs:
+        for second in logs:
+            pull = np.array([first, second]) - np.log(0.5)
+            sensitivity = np.hstack([np.exp(first) * parts[0], np.exp(second) * parts[1]])
+            density = multivariate_normal(np.zeros(5), sensitivity @ sensitivity.T + noise).logpdf(data)
+            weights.append(np.exp(density - 0.5 * pull @ precision @ pull))
+            mean, covariance = posterior(sensitivity, data, noise)
+            size = np.repeat(np.exp([first, second]), [2, 3])
+            means.append(size * mean)
+            squares.append(size**2 * (np.diagonal(covariance) + mean**2))
+    mean = np.average(means, axis=0, weights=weights)
+    std = np.sqrt(np.average(squares, axis=0, weights=weights) - mean**2)
+    assert_allclose(members.mean(axis=0), mean, atol=0.1 * std.max())
+    assert_allclose(members.std(axis=0), std, rtol=0.1)
+    alone = posterior(np.hstack([scale * part for scale, part in zip(scales, parts, strict=True)]), data, noise)[1]
+    assert np.abs(np.repeat(scales, [2, 3]) * np.sqrt(np.diagonal(alone)) / std - 1).max() > 0.2
 
 
 def test_the_most_likely_scales_have_the_largest_evidence():
@@ -208,7 +246,7 @@ def test_what_no_datum_moves_keeps_its_prior_and_takes_no_column():
     assert linear.parts[0].shape == (30, 3)
     assert_allclose(step.mean, mean, atol=1e-3)
     assert_allclose(step.n_determined, np.trace(np.eye(60) - covariance), rtol=1e-6)
-    members = draw_posterior(step, linear, np.ones(1), noise, np.random.default_rng(1), 2000, factor=0.0)
+    members = draw_posterior(linear, [held(60)], np.ones(1), noise, np.random.default_rng(1), 2000, factor=0.0)
     assert np.abs((members @ seen[:, 3]).std() - 1) < 0.1
     assert np.abs((members @ seen[:, 0]).std() - np.sqrt(seen[:, 0] @ covariance @ seen[:, 0])) < 0.05
 

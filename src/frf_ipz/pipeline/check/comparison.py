@@ -47,7 +47,7 @@ def compare_with_model(inputs: PipelineInputs, estimate: FrfEstimate) -> Look:
     if estimate.modes is not None:
         return _beside_stated_modes(inputs, estimate.modes)
     places, labels = inputs.places_of_mistakes, estimate.frfs.labels
-    impacts = estimate.traces if inputs.test.kind == "hammer" else ()
+    impacts = inputs.impacts(estimate)
     exchanged = find_exchanged_columns(impacts, labels, test_file=places["test_file"])
     try:
         peaks = find_peaks(estimate.frfs, inputs.options.fit)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from frf_ipz.assessment.assess import likely_cause
 from frf_ipz.assessment.causes.columns import find_exchanged_columns
-from frf_ipz.errors import InputError, NoModesError, NumericalError
+from frf_ipz.errors import FrfIpzError, InputError, NoModesError, NumericalError
 
 if TYPE_CHECKING:
+    from frf_ipz.assessment.assessment import LikelyCause
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pipeline.inputs import PipelineInputs
@@ -47,17 +48,9 @@ def naming_the_cause(
     try:
         yield
     except NumericalError as error:
-        impacts = recordings.traces if inputs.test.kind == "hammer" else ()
-        cause = likely_cause(
-            recordings.frfs,
-            fit,
-            fe_model,
-            impacts=impacts,
-            **inputs.places_of_mistakes,
-        )
-        if cause is None:
-            raise
-        raise InputError(f"{inputs.source}: {error}; most likely {cause.says} ({cause.place})") from error
+        impacts = inputs.impacts(recordings)
+        cause = likely_cause(recordings.frfs, fit, fe_model, impacts=impacts, **inputs.places_of_mistakes)
+        _raise_with(cause, error, inputs)
 
 
 @contextmanager
@@ -84,9 +77,12 @@ def naming_exchanged_columns(inputs: PipelineInputs, recordings: FrfEstimate) ->
     try:
         yield
     except (NoModesError, NumericalError) as error:
-        impacts = recordings.traces if inputs.test.kind == "hammer" else ()
         test_file = inputs.places_of_mistakes["test_file"]
-        cause = find_exchanged_columns(impacts, recordings.frfs.labels, test_file=test_file)
-        if cause is None:
-            raise
-        raise InputError(f"{inputs.source}: {error}; most likely {cause.says} ({cause.place})") from error
+        cause = find_exchanged_columns(inputs.impacts(recordings), recordings.frfs.labels, test_file=test_file)
+        _raise_with(cause, error, inputs)
+
+
+def _raise_with(cause: LikelyCause | None, error: FrfIpzError, inputs: PipelineInputs) -> NoReturn:
+    if cause is None:
+        raise error
+    raise InputError(f"{inputs.source}: {error}; most likely {cause.says} ({cause.place})") from error

@@ -147,7 +147,7 @@ def assess(
                 with_causes=with_causes,
                 explained_model=_explained_model(runner, fe_model, diagnosis),
                 is_corrected=inputs.options.diagnose.apply,
-                impacts=recordings.traces if inputs.test.kind == "hammer" else (),
+                impacts=inputs.impacts(recordings),
                 records=recordings.records,
                 **places,
             )

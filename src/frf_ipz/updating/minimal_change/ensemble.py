@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from frf_ipz.arrays import FloatArray
 from frf_ipz.updating.gaussian import draw_posterior
 from frf_ipz.updating.minimal_change.damping import DampingPhase
-from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult
+from frf_ipz.updating.minimal_change.gauss_newton import Phase, PhaseResult
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, is_negative
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase
 from frf_ipz.updating.parameters import unwhiten
@@ -81,7 +81,7 @@ def _draw_stiffness(
     posterior: Posterior, rng: np.random.Generator, count: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     phase, result = posterior.stiffness, posterior.stiffness_result
-    whitened, theta, mass, stiffness = _with_positive_mass(posterior, _draw(result, rng, count))
+    whitened, theta, mass, stiffness = _with_positive_mass(posterior, _draw(phase, result, rng, count))
     # the poles predicted by the linear step are imposed: far from the mean, second-order terms would blur them
     poles = np.flatnonzero(phase.target_roots.frf < 0)
     sensitivity = np.empty((len(poles), result.linear.ends[-1] - result.linear.ends[0]))
@@ -119,10 +119,10 @@ def _with_positive_mass(
     return whitened, theta, mass, stiffness
 
 
-def _draw(result: PhaseResult, rng: np.random.Generator, count: int) -> FloatArray:
+def _draw(phase: Phase, result: PhaseResult, rng: np.random.Generator, count: int) -> FloatArray:
     """Whitened parameters, (count, k)."""
     scales, factor = result.scales[:-1], float(result.scales[-1])
-    return draw_posterior(result.step, result.linear, scales, result.noise, rng, count, factor=factor)
+    return draw_posterior(result.linear, phase.terms, scales, result.noise, rng, count, factor=factor)
 
 
 def _with_poles(
@@ -142,7 +142,7 @@ def _with_poles(
 
 def _draw_damping(posterior: Posterior, rng: np.random.Generator, count: int) -> FloatArray:
     phase, result = posterior.damping, posterior.damping_result
-    whitened = _draw(result, rng, count)
+    whitened = _draw(phase, result, rng, count)
     members = phase.damping(unwhiten(phase.terms, result.scales[:-1], whitened))
     values, vectors = np.linalg.eigh(members)
     members = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
