@@ -54,6 +54,7 @@ ROWS_OF_A_TILE = 128  # when a matrix is mirrored: both tiles stay in the cache
 ALIKE = 1e-4  # relative, of the noise of each datum: none is known as well
 LARGEST_SHARES = 1e3  # in a mixture: what rounding may grow by
 OF_PRIOR = 1e-2  # of its information: what rounding may take of it
+INDEFINITE = "the information of an update is not positive definite"
 UNTOLD = 1e-4  # of the prior's information: a deviation that so few data narrow is the prior's to four digits
 
 
@@ -321,7 +322,7 @@ class Linearised:
         # symmetric: what LAPACK takes for its columns are the rows, so that nothing is copied
         root, info = lapack.dpotrf(information.T, lower=0, clean=1, overwrite_a=1)
         if info:
-            raise np.linalg.LinAlgError("the information of an update is not positive definite")
+            raise np.linalg.LinAlgError(INDEFINITE)
         return np.asarray(root), products[:-1, -1]
 
 
@@ -711,14 +712,18 @@ def _drawn_scales(
     search = _ScaleSearch(linear, terms, np.array([term.scale_uncertainty > 0 for term in terms]), scales, factor)
     center = np.log(scales)[search.free]
     top = search.evaluate(center)
+    if top is None:
+        raise np.linalg.LinAlgError(INDEFINITE)
     if not len(center) or not len(linear.data) or not count:
         yield top, np.arange(count)
         return
     root = np.linalg.cholesky(top.curvature())
     white = rng.standard_normal(((count + DRAWS_OF_A_SCALE - 1) // DRAWS_OF_A_SCALE, len(center)))
     white[len(white) // 2 :] = -white[: len(white) - len(white) // 2]
-    tried = [search.evaluate(logs) for logs in center + np.linalg.solve(root.T, white.T).T]
-    logs_of_weights = 0.5 * np.sum(white**2, axis=1) - np.array([evidence.value for evidence in tried])
+    found = [search.evaluate(logs) for logs in center + np.linalg.solve(root.T, white.T).T]
+    told = [number for number, evidence in enumerate(found) if evidence is not None]
+    tried = [evidence for evidence in found if evidence is not None]
+    logs_of_weights = 0.5 * np.sum(white[told] ** 2, axis=1) - np.array([evidence.value for evidence in tried])
     shares = np.cumsum(np.exp(logs_of_weights - logs_of_weights.max()))
     owners = np.searchsorted(shares, (np.arange(count) + 0.5) / count * shares[-1])
     for owner in np.unique(owners).tolist():
@@ -751,6 +756,8 @@ def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: Fl
     search = _ScaleSearch(linear, terms, free, start)
     logs = np.clip(np.log(start)[free], search.low, search.high)
     evidence = search.evaluate(logs)
+    if evidence is None:
+        raise np.linalg.LinAlgError(INDEFINITE)
     curvature, gain_before = None, 0.0
     for _ in range(MAX_SCALE_STEPS):
         slope = evidence.slope
@@ -768,7 +775,7 @@ def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: Fl
         for _ in range(MAX_HALVINGS):
             tried = np.clip(logs + step, search.low, search.high)
             new = search.evaluate(tried)
-            if new.value <= evidence.value:
+            if new is not None and new.value <= evidence.value:
                 break
             step /= 2
         else:
@@ -833,14 +840,17 @@ class _ScaleSearch:
             step[open_ones] = -np.linalg.solve(curvature[np.ix_(open_ones, open_ones)], slope[open_ones])
         return step * min(1.0, LARGEST_SCALE_STEP / max(float(np.abs(step).max()), np.finfo(float).tiny))
 
-    def evaluate(self, logs: FloatArray) -> _Evidence:
-        """Value there; slope and expected curvature on demand."""
+    def evaluate(self, logs: FloatArray) -> _Evidence | None:
+        """Value there; slope and expected curvature on demand; None where double precision cannot tell."""
         scales = self.start.copy()
         scales[self.free] = np.exp(logs)
         linear, count = self.linear, len(self.linear.bases)
         has_slack = len(self.terms) > count
         factor = float(scales[-1]) if has_slack else self.held
-        root, right = linear.information(scales[:count], factor)
+        try:
+            root, right = linear.information(scales[:count], factor)
+        except np.linalg.LinAlgError:  # so large that what rounding leaves of the prior is not positive
+            return None
         mean = cho_solve((root, False), right, check_finite=False)
         weights = 1 / (linear.level + factor**2)
         value = 0.5 * float(weights @ linear.data**2 - right @ mean) + float(np.log(np.diagonal(root)).sum())

@@ -1,7 +1,9 @@
 """Effect of position errors of sensors and excitation on zeros.
 
 Poles belong to the structure, wherever it is excited. Zeros depend on both positions: where the row of the output or
-of the input changes by dr, the zero z of H = r_o D^-1 r_i moves by - dH(z) / H'(z).
+of the input changes by dr, the zero z of H = r_o D^-1 r_i moves by - dH(z) / H'(z), to first order. Few positions move
+many zeros: if that were all, the zeros would have to lie where so few numbers take them, to all digits, and what they
+miss of that would be taken for a change of the structure. So what the first order leaves is a noise too, of each zero.
 """
 
 from __future__ import annotations
@@ -11,11 +13,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import eigh
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.dofs import AnyDof
 from frf_ipz.identification.root_covariance import RootCovariance
+from frf_ipz.numerics.damped_modes import damped_modes
 from frf_ipz.numerics.pole_forms import damped_form
+
+DRAWS, SEED = 16, 0  # of all positions; of a variance a third is known by them, where any is far better than none
+SOFT = 1e-3  # of the lowest zero: frequency given to rigid-body modes, whose double poles at 0 have no residues
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
@@ -84,15 +91,16 @@ def with_position_uncertainty(
     if not misplacements or not np.any(problem.frf >= 0):
         return covariance
     changes = _zero_changes(problem, misplacements)
+    beyond = _beyond_first_order(problem, misplacements, changes)
     if not isinstance(covariance, RootCovariance):
-        return np.asarray(covariance + (changes @ changes.T).toarray())
+        return np.asarray(covariance + (changes @ changes.T + beyond).toarray())
     is_output = np.array([position.is_output for position in misplacements])
     # what few positions are is common to many FRFs; each of the many is that of a few FRFs, which become one block
     is_common = is_output if 2 * is_output.sum() < len(is_output) else ~is_output
     own = changes[:, ~is_common]
     return RootCovariance(
         common=np.hstack([covariance.common, changes[:, is_common].toarray()]),
-        blocks=sparse.csr_array(covariance.blocks + own @ own.T),
+        blocks=sparse.csr_array(covariance.blocks + own @ own.T + beyond),
     )
 
 
@@ -117,12 +125,90 @@ def _zero_changes(
     )
 
 
+def _beyond_first_order(
+    problem: UpdateProblem,
+    misplacements: tuple[PositionUncertainty, ...],
+    changes: sparse.csc_array[np.float64],
+) -> sparse.csr_array[np.float64]:
+    """Covariance, (2 n, 2 n), of how zeros miss the first order: Newton's next step, where positions are drawn."""
+    zeros = np.flatnonzero(problem.frf >= 0)
+    receptance = _Receptance.at_zeros(problem, zeros)
+    labels = [problem.labels[frf] for frf in problem.frf[zeros].tolist()]
+    turns = [_incidence([end(label) for label in labels], misplacements, is_output=end is _output) for end in ENDS]
+    rows = np.array([position.row for position in misplacements])
+    white = np.random.default_rng(SEED).standard_normal((DRAWS, len(misplacements)))
+    blocks = np.zeros((len(zeros), 2, 2))
+    for draw in white:
+        moved = (changes @ draw).reshape(-1, 2)[zeros] @ np.array([1.0, 1j])
+        outputs, inputs = (turn @ (draw[:, None] * rows) for turn in turns)
+        further = receptance.newton_step(outputs, inputs, problem.computed[zeros] + moved)
+        further *= np.minimum(1.0, np.abs(moved) / np.maximum(np.abs(further), np.finfo(float).tiny))
+        parts = np.stack([further.real, further.imag], axis=1)
+        blocks += parts[:, :, None] * parts[:, None, :] / DRAWS
+    places = 2 * zeros[:, None] + np.arange(2)
+    at = np.broadcast_to(places[:, :, None], blocks.shape), np.broadcast_to(places[:, None, :], blocks.shape)
+    shape = (2 * len(problem.values),) * 2
+    return sparse.csr_array((blocks.ravel(), (at[0].ravel(), at[1].ravel())), shape=shape)
+
+
+def _incidence(
+    dofs: list[AnyDof], misplacements: tuple[PositionUncertainty, ...], *, is_output: bool
+) -> sparse.csr_array[np.float64]:
+    """Which of the positions are those of each DOF."""
+    places = _places(dofs)
+    pairs = [
+        (place, column)
+        for column, position in enumerate(misplacements)
+        if position.is_output == is_output
+        for place in places.get(position.dof, np.zeros(0, np.int64)).tolist()
+    ]
+    rows, columns = np.array(pairs, int).reshape(-1, 2).T
+    return sparse.csr_array((np.ones(len(pairs)), (rows, columns)), shape=(len(dofs), len(misplacements)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Receptance:
+    """The FRF of each of n zeros, by k poles."""
+
+    poles: ComplexArray
+    right: ComplexArray
+    left: ComplexArray
+    outputs: FloatArray
+    inputs: FloatArray
+
+    @classmethod
+    def at_zeros(cls, problem: UpdateProblem, zeros: IntArray) -> _Receptance:
+        model = problem.model
+        squares, shapes = eigh(model.stiffness, model.mass)
+        rates = shapes.T @ model.damping @ shapes
+        least = SOFT * np.abs(problem.computed[zeros]).min()
+        poles, right, left = damped_modes(np.maximum(squares, least**2), (rates + rates.T) / 2)
+        rows = {frf: problem.rows(frf) for frf in np.unique(problem.frf[zeros]).tolist()}
+        outputs, inputs = (np.array([rows[frf][side] for frf in problem.frf[zeros].tolist()]) for side in range(2))
+        whole = np.where(poles.imag > 0, 1.0, 0.5)
+        return cls(poles, shapes @ right, shapes @ left * whole, outputs, inputs)
+
+    def newton_step(self, outputs: FloatArray, inputs: FloatArray, s: ComplexArray) -> ComplexArray:
+        """Step from s (n,) to the zero, where the rows of sensors and excitations change by (n, r) arrays."""
+        residues = ((self.outputs + outputs) @ self.right) * ((self.inputs + inputs) @ self.left)
+        terms = residues / (s[:, None] - self.poles), residues.conj() / (s[:, None] - self.poles.conj())
+        value = terms[0].sum(axis=1) + terms[1].sum(axis=1)
+        slopes = [
+            term / (s[:, None] - poles) for term, poles in zip(terms, (self.poles, self.poles.conj()), strict=True)
+        ]
+        slope = -slopes[0].sum(axis=1) - slopes[1].sum(axis=1)
+        return np.divide(-value, slope, out=np.zeros_like(value), where=slope != 0)
+
+
 def _output(label: FrfLabel) -> AnyDof:
     return label.output_dof
 
 
 def _input(label: FrfLabel) -> AnyDof:
     return label.input_dof
+
+
+ENDS = (_output, _input)
 
 
 def _places(dofs: list[AnyDof]) -> dict[AnyDof, IntArray]:

@@ -236,7 +236,8 @@ def iterate(
         state, fraction = _line_search(phase, scales, before, step.mean, linear)
         predicted = before.error + fraction * (data - _explained(linear, scales[:-1], step.mean) - before.error)
         deviation = np.abs(state.error - predicted)
-        is_nearer = _cost(state, noise) < _cost(best, noise)
+        gain = _cost(best, noise) - _cost(state, noise)
+        is_nearer = gain > 0
         best = state if is_nearer else best
         if fraction:
             nonlinearity = np.maximum(CURVATURE * deviation, 0.0 if is_nearer else nonlinearity)
@@ -245,7 +246,8 @@ def iterate(
         row = _history_row(terms, iteration, state.error, noise, step, scales, fraction)
         rows.append(row | phase.history_columns(state.theta))
         distance = distance_to_optimum(linear, step, scales[:-1], float(scales[-1]), state.whitened, state.error)
-        converged = distance < CONVERGED
+        is_nearing = rows[-1]["misfit"] > len(data) and gain > CONVERGED**2  # what stands for curvature hides errors
+        converged = distance < CONVERGED and not is_nearing
         if converged or rows[-1]["misfit"] < MET * len(data):
             converged = True
             break
