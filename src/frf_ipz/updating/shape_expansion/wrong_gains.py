@@ -115,9 +115,9 @@ def _compare(
     for mode in range(len(measured.omega)):
         field = field_at_points(model, measured, mode)
         for number, error in enumerate(ERRORS):
-            one, all_gains = density.of_mode(field, measured, mode, float(error), np.expm1(-log_gains))
+            one, all_gains = density.of_mode(field, measured, mode, float(error), log_gains)
             as_it_is[number] += one
-            corrected[number] += all_gains - log_gains
+            corrected[number] += all_gains
     posterior = corrected + log_weights[:, None, None] + log_prior
     of_point = logsumexp(posterior, axis=(0, 2))
     shares = np.exp(logsumexp(posterior, axis=0) - of_point[:, None])
@@ -180,9 +180,9 @@ class DirectionDensity:
         )
 
     def of_mode(
-        self, field: FieldAtPoints, measured: MeasuredShapes, mode: int, error: float, factors: FloatArray
+        self, field: FieldAtPoints, measured: MeasuredShapes, mode: int, error: float, log_gains: FloatArray
     ) -> tuple[float, FloatArray]:
-        """Give the density of a mode as it was measured, and with each point changed.
+        """Give the density of a mode as it was measured, and if each point had a gain.
 
         Parameters
         ----------
@@ -194,15 +194,15 @@ class DirectionDensity:
             Which one.
         error : float
             Relative error of each measured amplitude.
-        factors : (n,) array
-            What is added to a point, over what was measured there.
+        log_gains : (n,) array
+            Logarithm of the gain.
 
         Returns
         -------
         as_it_is : float
             Logarithm, but for a constant.
-        changed : (n_mine, n) array
-            The same with each point changed by each factor.
+        with_gain : (n_mine, n) array
+            The same where each point has each gain.
         """
         direction, opposite = np.zeros(self.n_mine + self.n_other), np.zeros(self.n_mine + self.n_other)
         direction[self.mine] = (measured.at_outputs if self.is_output else measured.at_inputs)[mode]
@@ -211,7 +211,7 @@ class DirectionDensity:
         inverse = linalg.cho_solve((lower, True), np.eye(len(lower)))
         by_direction, by_opposite = inverse @ direction, inverse @ opposite
         square, square_opposite, product = direction @ by_direction, opposite @ by_opposite, direction @ by_opposite
-        change = np.concatenate([[0.0], factors]) * direction[self.mine, None]
+        change = np.concatenate([[0.0], np.expm1(-log_gains)]) * direction[self.mine, None]
         squares = square + 2 * change * by_direction[self.mine, None] + change**2 * np.diag(inverse)[self.mine, None]
         correlation = (product + change * by_opposite[self.mine, None]) / np.sqrt(squares * square_opposite)
         hyperbolic = np.arctanh(np.clip(correlation, ROUNDING - 1, 1 - ROUNDING))
@@ -221,4 +221,4 @@ class DirectionDensity:
             - self.n_other / 2 * np.log(square_opposite)
             - np.log(np.diag(lower)).sum()
         )
-        return float(values[0, 0]), values[:, 1:]
+        return float(values[0, 0]), values[:, 1:] - log_gains

@@ -1,13 +1,15 @@
 """A gain that is wrong in all modes is found where the model is nearly right, and no other."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import frf_ipz
 from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes
-from frf_ipz.updating.shape_expansion.wrong_gains import find_wrong_gains
+from frf_ipz.updating.shape_expansion.random_forces import FieldAtPoints, ModalModel
+from frf_ipz.updating.shape_expansion.wrong_gains import DirectionDensity, find_wrong_gains
 from frf_testbench.updating.synthetic_fit import TrueModes, simulate_fit
 
 POINTS = [frf_ipz.Dof(node, "z") for node in (3, 8, 14, 19, 25, 30, 36, 40)]
@@ -73,3 +75,19 @@ def test_a_wrong_gain_is_taken_off(measurement):
     corrected, right = measured_shapes(off, wrong_gains=wrong), measured_shapes(fit)
     np.testing.assert_allclose(np.abs(corrected.at_inputs), np.abs(right.at_inputs), rtol=0, atol=0.05)
     assert corrected.doubt[1 + POINTS.index(WRONG)] == wrong[WRONG].std ** 2
+
+
+def test_the_density_of_directions_is_one():
+    """Over all directions of two points its sum is the same, whatever the gain of one of them."""
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(3, 3))
+    field = FieldAtPoints(rows=root, power=np.ones(3), prior=root @ root.T, unit_variance=np.ones(3), own=np.zeros(3))
+    sides = {"outputs": np.ones((1, 3)), "inputs": np.ones((2, 3))}
+    density = DirectionDensity.of(ModalModel(omega=np.ones(3), shapes=np.eye(3), **sides), is_output=False)
+    log_gains = np.log([0.2, 5.0])
+    sums = np.zeros(3)
+    for angle in np.linspace(0.0, np.pi, 400, endpoint=False):
+        directions = SimpleNamespace(at_outputs=[[1.0]], at_inputs=[[np.cos(angle), np.sin(angle)]])
+        as_it_is, with_gain = density.of_mode(field, directions, 0, 0.1, log_gains)
+        sums += np.exp([as_it_is, *with_gain[0]])
+    np.testing.assert_allclose(sums, sums[0], rtol=1e-3, atol=0)
