@@ -767,8 +767,11 @@ def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: Fl
             break
         for _ in range(MAX_HALVINGS):
             tried = np.clip(logs + step, search.low, search.high)
-            new = search.evaluate(tried)
-            if new.value <= evidence.value:
+            try:
+                new = search.evaluate(tried)
+            except np.linalg.LinAlgError:  # so far off that rounding takes the prior's information
+                new = None
+            if new is not None and new.value <= evidence.value:
                 break
             step /= 2
         else:
