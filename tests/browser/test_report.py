@@ -178,6 +178,7 @@ def test_no_picture_is_wider_than_the_paper_when_printed(page):
     assert 0 < max(widths) <= 700
 
 
+@pytest.mark.slow
 def test_a_hundred_frfs_of_fifty_thousand_lines_draw(browser, tmp_path):
     path = tmp_path / "big.html"
     write_report(

@@ -129,7 +129,7 @@ def test_ticks_of_frequency_axes_are_whole_numbers_and_few(page, zoom):
             assert numbers == [20, 50, 100, 200, 500]
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_nothing_is_wider_than_a_narrow_screen(screen, written, theme):
     resize(screen, 390)
     prefer(screen, theme)
@@ -139,7 +139,7 @@ def test_nothing_is_wider_than_a_narrow_screen(screen, written, theme):
     assert page.execute_script(OUTSIDE) == []
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_all_that_is_written_stands_out_from_what_is_behind_it(screen, written, theme):
     prefer(screen, theme)
     page = open_page(screen, written)

@@ -23,7 +23,7 @@ from frf_ipz.runs.generations import stamp
 
 pytestmark = pytest.mark.slow
 
-COUNT = int(os.environ.get("MACHINES", "16"))
+COUNT = int(os.environ.get("MACHINES", "12"))
 TABLES = ("fleet", "fleet_poles", "fleet_zeros", "fleet_parameters", "fleet_findings")
 PATIENCE_S = 300.0
 DASK = (sys.executable, "-m", "distributed.cli")

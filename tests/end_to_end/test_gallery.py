@@ -13,6 +13,7 @@ import frf_ipz
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 EXAMPLES = sorted(GALLERY.glob("plot_*.py"))
 LONGEST = 80
+QUICK = {"plot_diagnosis", "plot_own_arrays", "plot_recordings"}  # a build of the documentation runs them all
 ALLOWED = {"frf_ipz", "matplotlib.pyplot", "numpy", "pathlib"}
 
 
@@ -32,6 +33,7 @@ def private_names(code):
 
 
 def test_there_are_examples():
+    assert {path.stem for path in EXAMPLES} >= QUICK
     assert 6 <= len(EXAMPLES) <= 12
 
 
@@ -48,7 +50,10 @@ def test_a_private_name_would_be_seen():
     assert private_names("from frf_ipz.fe import eigen\nimport os") == ["frf_ipz.fe", "os"]
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(path, id=path.stem, marks=[] if path.stem in QUICK else pytest.mark.slow) for path in EXAMPLES],
+)
 def test_example_runs_and_draws(path, monkeypatch, capsys):
     mpl.use("Agg")
     drawn = []

@@ -16,7 +16,7 @@ HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
         ("arrays", 4),
         ("ports", 1),
         ("own_effect", 1),
-        ("fleets", 2),
+        pytest.param("fleets", 2, marks=pytest.mark.slow),  # compares states, and runs a fleet: each has quick tests
         ("extend", 2),
         ("modes_only", 1),
         ("other_software", 1),

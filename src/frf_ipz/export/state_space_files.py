@@ -271,7 +271,8 @@ def read_ensemble(path: str | Path) -> list[control.StateSpace]:
     ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
     ... )
     >>> from tempfile import TemporaryDirectory
-    >>> campaign = frf_ipz.Campaign(frfs, beam, points=["9:+z"], export=frf_ipz.ExportOptions(ensemble=3))
+    >>> options = {"diagnose": frf_ipz.DiagnoseOptions(run="never"), "export": frf_ipz.ExportOptions(ensemble=3)}
+    >>> campaign = frf_ipz.Campaign(frfs, beam, points=["9:+z"], **options)
     >>> with TemporaryDirectory() as folder:
     ...     _ = campaign.run(folder, until="export")
     ...     len(frf_ipz.read_ensemble(f"{folder}/statespace_ensemble.mat"))
@@ -333,7 +334,8 @@ def read_uncertainty_weights(path: str | Path) -> UncertaintyWeights:
     ...     lines, values, outputs=[middle, tip], inputs=[tip], variance=np.full(values.shape, 1e-4)
     ... )
     >>> from tempfile import TemporaryDirectory
-    >>> campaign = frf_ipz.Campaign(frfs, beam, points=["9:+z"], export=frf_ipz.ExportOptions(ensemble=3))
+    >>> options = {"diagnose": frf_ipz.DiagnoseOptions(run="never"), "export": frf_ipz.ExportOptions(ensemble=3)}
+    >>> campaign = frf_ipz.Campaign(frfs, beam, points=["9:+z"], **options)
     >>> with TemporaryDirectory() as folder:
     ...     _ = campaign.run(folder, until="export")
     ...     frf_ipz.read_uncertainty_weights(f"{folder}/uncertainty.json").output_names

@@ -71,10 +71,10 @@ def bending_motions(dofs: Sequence[Dof], geometry: Geometry) -> FloatArray:
     size = float(np.abs(positions).max(initial=0.0)) or 1.0
     scaled = positions / size
     still = np.zeros((len(directions), 1))
+    deflections = [_monomial(scaled, powers) for powers in MONOMIALS]
     columns = []
     for along in range(3):
-        for powers in MONOMIALS:
-            value, gradient = _monomial(scaled, powers)
+        for value, gradient in deflections:
             translation = -scaled[:, [along]] * gradient
             translation[:, along] = value
             rotation = np.cross(gradient, np.eye(3)[along]) / size

@@ -235,7 +235,7 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
         used_lines=lines.used,
         frequency_hz=frfs.frequency_hz[lines.used],
         zeros=zeros.zeros,
-        covariance=_root_covariance(errors, zeros, modes),
+        covariance=_root_covariance(errors, zeros, modes, fitted.drift),
         residue_covariance=residue_covariance(errors, lines.powers, modes) + of_force[:, :, None, None] * np.eye(2),
         value_std=np.hypot(value_std(errors, lines.s) * unit, common * np.abs(computed) * unit),
         stabilization=columns_of_modes(fitted.start, natural_frequency_hz(fit.poles[modes]), options.stability),
@@ -261,7 +261,7 @@ def _decisions(fitted: FittedModes, modes: IntArray, unconfirmed: tuple[str, ...
     return pd.DataFrame([*fitted.decisions, *rows], columns=["frequency_hz", "damping_ratio", "action", "reason"])
 
 
-def _root_covariance(errors: FitErrors, zeros: ZerosWithErrors, modes: IntArray) -> RootCovariance:
+def _root_covariance(errors: FitErrors, zeros: ZerosWithErrors, modes: IntArray, drift: Drift | None) -> RootCovariance:
     real, imag = np.split(errors.pole_root, 2)
     poles = np.stack([real[modes], imag[modes]], axis=1).reshape(2 * len(modes), -1)
     unknown = np.repeat(~zeros.zeros.identifiable, 2)
@@ -274,7 +274,12 @@ def _root_covariance(errors: FitErrors, zeros: ZerosWithErrors, modes: IntArray)
     diagonal = np.concatenate([np.zeros(len(poles)), np.where(unknown, np.inf, 0.0)])
     rows = np.flatnonzero(diagonal)
     infinite = sparse.csr_array((diagonal[rows], (rows, rows)), shape=blocks.shape)
-    return RootCovariance(common=np.concatenate([poles, common]), blocks=sparse.csr_array(blocks + infinite))
+    sources = np.concatenate([poles, common])
+    if drift is not None:  # the mean that all recordings share moves all roots by one factor
+        roots = np.concatenate([errors.system.poles[modes], np.nan_to_num(zeros.zeros.values)])
+        moved = np.stack([roots.real, roots.imag], axis=1).ravel() * np.concatenate([np.ones(len(poles)), ~unknown])
+        sources = np.column_stack([sources, drift.mean_std * moved])
+    return RootCovariance(common=sources, blocks=sparse.csr_array(blocks + infinite))
 
 
 def _warnings(

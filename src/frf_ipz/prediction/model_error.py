@@ -86,6 +86,8 @@ def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEn
     scale = updated.scale
     on_time = replace(fit.model, delay_s=np.zeros_like(fit.model.delay_s))  # a model of the structure is never late
     measured = on_time(s) / (scale.gains(fit.labels) if scale.is_relative else fit.gain)
+    if updated.expansion is not None:  # a wrong gain is an error of the test
+        measured = measured / updated.expansion.wrong_gains_of(fit.labels)
     centre = as_ensemble(updated, ensemble.lowest_rad_s)
     lines_hz = np.abs(s) / (2 * np.pi)
     power = np.zeros(len(s))

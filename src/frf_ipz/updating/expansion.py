@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import BoolArray, FloatArray
+from frf_ipz.arrays import FloatArray
 from frf_ipz.dofs import AnyDof, Dof
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from frf_ipz.frf import FrfLabel
+
 MOST_NAMED = 4
-FEWEST = 5  # points among which one may stand out
-APART = 4.0  # standard deviations of the others, by their median deviation
-NORMAL = 1.4826  # standard deviation over median deviation
-LEAST = 0.05  # of a gain: less is what calibrations promise
 TOLD = 0.1  # of a mass, at the low end of its interval: else the data do not tell it from none
 
 
@@ -76,6 +78,8 @@ class ShapeExpansion:
     reciprocal_spread : float
         The same at a sensor where the test only excites, or the other way round: the model's shapes are known there as
         well as reciprocity holds.
+    wrong_gains : tuple of (str, float, float)
+        Points whose gain is wrong: logarithm of what was measured over what is, and its standard deviation.
 
     Examples
     --------
@@ -100,6 +104,7 @@ class ShapeExpansion:
     inner_nodes: tuple[int, ...] = ()
     inner_spread: float = 1.0
     reciprocal_spread: float = 1.0
+    wrong_gains: tuple[tuple[str, float, float], ...] = ()
 
     def spread_at(self, dof: AnyDof) -> float:
         """Tell how much of the ensemble's spread is due at a point.
@@ -115,6 +120,24 @@ class ShapeExpansion:
             0 to 1; 1 beyond the measured points, and for a port, which has no place of its own.
         """
         return self.inner_spread if isinstance(dof, Dof) and dof.node in self.inner_nodes else 1.0
+
+    def wrong_gains_of(self, labels: Sequence[FrfLabel]) -> FloatArray:
+        """Give the factor by which each measured FRF is off, by the points whose gain is wrong.
+
+        Parameters
+        ----------
+        labels : sequence of FrfLabel
+            All FRFs of the test.
+
+        Returns
+        -------
+        (n_frfs,) array
+            1 where nothing is wrong.
+        """
+        sides = [label.output_dof for label in labels], [label.input_dof for label in labels]
+        ends = max(sides, key=lambda side: len(set(side)))
+        log_gains = {point: log_gain for point, log_gain, _ in self.wrong_gains}
+        return np.exp([log_gains.get(end.name, 0.0) for end in ends])
 
     @property
     def median_db(self) -> float:
@@ -137,7 +160,7 @@ class ShapeExpansion:
                 "measured shapes and frequencies ask for masses that the model lacks (90 % interval): "
                 f"{', '.join(told)}; and for {100 * (self.stiffness_ratio - 1):+.2g} % of stiffness"
             )
-        texts += self._points_apart()
+        texts += self._gain_texts()
         if self.split:
             groups = "; ".join(", ".join(f"{hz:.4g}" for hz in group) for group in self.split[:MOST_NAMED])
             texts.append(
@@ -146,37 +169,11 @@ class ShapeExpansion:
             )
         return tuple(texts)
 
-    def _points_apart(self) -> list[str]:
-        """Name the points whose amplitudes disagree with what all others imply."""
-        if not self.is_level_known:
-            return []
-        logs, scatter, is_apart = points_apart(np.log(self.ratio))
+    def _gain_texts(self) -> list[str]:
+        """Name the points whose gain is wrong."""
         return [
-            f"what was measured at {self.points[place]} is {100 * abs(np.expm1(logs[place])):.0f} % "
-            f"{'low' if logs[place] < 0 else 'high'} in all its modes against what the other points imply, which "
-            f"scatter by {100 * scatter:.1g} %: look at the gain of that file"
-            for place in np.flatnonzero(is_apart).tolist()
+            f"what was measured at {point} is {100 * abs(np.expm1(log_gain)):.0f} +- {100 * max(std, 0.01):.0f} % "
+            f"{'low' if log_gain < 0 else 'high'} in all its modes against what the other points imply: look at the "
+            "gain of that file; the prediction goes by the others"
+            for point, log_gain, std in self.wrong_gains
         ]
-
-
-def points_apart(log_ratio: FloatArray) -> tuple[FloatArray, float, BoolArray]:
-    """Find the points whose amplitudes disagree with what all others imply.
-
-    Parameters
-    ----------
-    log_ratio : (n_points,) array
-        Logarithm of measured over predicted amplitude.
-
-    Returns
-    -------
-    deviation : (n_points,) array
-        From the median.
-    scatter : float
-        Standard deviation, by the median deviation.
-    is_apart : (n_points,) bool array
-        Those that stand out; none where the points are too few to tell.
-    """
-    deviation = log_ratio - np.median(log_ratio)
-    scatter = NORMAL * float(np.median(np.abs(deviation)))
-    is_apart = np.abs(deviation) > max(APART * scatter, LEAST)
-    return deviation, scatter, is_apart & (len(log_ratio) >= FEWEST)

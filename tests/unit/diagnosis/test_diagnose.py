@@ -134,12 +134,13 @@ def test_excluded_parts_of_the_band_are_not_analysed(nominal):
         return 1 + 3.0 * (np.abs(frequency_hz - 100.0) < 2.0)[:, None]
 
     observations = observed(measured(nominal, factors=hum))
-    assert diagnose(observations, nominal, options=FEW).verdict != "consistent"
-    diagnosis = diagnose(replace(observations, exclude_hz=((97.0, 103.0),)), nominal, options=FEW)
+    options = DiagnoseOptions(effects=("damping_level", "global_stiffness"))  # what none explains takes long with many
+    assert diagnose(observations, nominal, options=options).verdict != "consistent"
+    diagnosis = diagnose(replace(observations, exclude_hz=((97.0, 103.0),)), nominal, options=options)
     assert diagnosis.verdict == "consistent"
     assert not ((diagnosis.mismatch_hz > 97.0) & (diagnosis.mismatch_hz < 103.0)).any()
     with pytest.raises(InputError, match="exclude_hz"):
-        diagnose(replace(observations, exclude_hz=((1.0, 1000.0),)), nominal, options=FEW)
+        diagnose(replace(observations, exclude_hz=((1.0, 1000.0),)), nominal, options=options)
 
 
 def test_a_channel_of_the_wrong_sign_is_found_and_put_right(nominal):

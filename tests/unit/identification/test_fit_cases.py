@@ -358,6 +358,31 @@ def test_drift_between_frfs_is_reported():
     assert float(fit.warnings[-1].split(" by ")[1].split(" ppm")[0]) == pytest.approx(200, rel=0.05)
 
 
+def test_frequencies_that_drift_are_those_of_the_mean_and_known_as_well_as_it_is():
+    """FRFs of little noise do not decide which temperature the poles belong to."""
+    truth = random_modes(SPREAD, 0.001, seed=SEED)
+    drift = 1e-4 * np.array([-1, 1, 0.5, -0.3, 0.8, -0.6, 0.2, 0.9, -0.9, 0.4, -0.7, -0.3])
+    columns = [
+        accelerances(
+            replace(truth, frequency_hz=SPREAD * (1 + change)),
+            LINES_HZ,
+            noise=3e-3 if k == 1 else 1e-2,
+            seed=SEED + k,
+        ).select_frfs([k])
+        for k, change in enumerate(drift)
+    ]
+    parts = {name: np.hstack([getattr(one, name) for one in columns]) for name in ("values", "variance")}
+    frfs = replace(accelerances(truth, LINES_HZ, seed=SEED), **parts)
+    fit = fit_modes(frfs, options=FitOptions())
+    poles = fit.model.poles[: fit.n_modes]
+    off = np.abs(poles) / (2 * np.pi * SPREAD * (1 + drift.mean())) - 1
+    np.testing.assert_allclose(off, 0.0, rtol=0, atol=5e-6)  # 5e-5 where the second FRF decides
+    std = np.sqrt(np.diag(fit.covariance)[1 : 2 * fit.n_modes : 2]) / np.abs(poles)
+    np.testing.assert_allclose(std, np.std(drift, ddof=1) / np.sqrt(12), rtol=0.2, atol=0)
+    correlation = fit.covariance[1, 3] / np.sqrt(fit.covariance[1, 1] * fit.covariance[3, 3])
+    assert correlation > 0.9  # one temperature moves all
+
+
 def test_model_error_is_reported():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     frfs = accelerances(truth, LINES_HZ, seed=SEED)

@@ -246,7 +246,7 @@ def test_results_made_before_the_last_change_are_named(tmp_path):
 
 
 def test_a_hundred_frfs_stay_light_and_keep_their_peaks(tmp_path):
-    recordings = many_frfs(100, 50_000)
+    recordings = many_frfs(100, 20_000)
     text = page_of(Folder(results={"ingest": recordings}, manifest={"stages": {"ingest": {}}}, stale=()), tmp_path)
     assert len(text.encode()) < MOST_BYTES
     data = data_of(text)

@@ -3,6 +3,12 @@
 A common factor per FRF moves poles in proportion to themselves. Gauss-Newton steps find it with the information that
 the poles are fitted by. Where it explains much of the misfit, each FRF is moved to the mean frequencies by the
 model: ``h(s) - h(s / (1 + drift))`` is added to it.
+
+The FRFs are draws of a structure that wavers, so that their mean is that of random effects: each weighs by one over the
+variance of the drift plus that of its noise, and the mean is known to no more than that allows [DerSimonian1986].
+
+[DerSimonian1986] R. DerSimonian, N. Laird, Meta-analysis in clinical trials, Controlled Clinical Trials 7, 1986,
+177-188, doi:10.1016/0197-2456(86)90046-2.
 """
 
 from __future__ import annotations
@@ -41,11 +47,14 @@ class Drift:
         Its standard deviation, from the noise alone.
     receptance : (n_lines, n_frfs) complex array
         The receptances at the mean frequencies, m/N.
+    mean_std : float
+        Standard deviation of the mean of the changes, common to all frequencies; 0 where the poles are held.
     """
 
     relative_change: FloatArray
     std: FloatArray
     receptance: ComplexArray
+    mean_std: float
 
 
 def find_drift(
@@ -82,7 +91,7 @@ def find_drift(
     for _ in range(ROUNDS):
         change = change + step
         if not poles_are_held:
-            change = change - np.average(change, weights=std**-2)
+            change = change - np.average(change, weights=_weights(change, std))
         if np.abs(change).max() > MAX_DRIFT:
             return None
         receptance = _at_mean_frequencies(data, best.system, terms, change)
@@ -90,13 +99,20 @@ def find_drift(
         best = refine_poles(replace(data, receptance=receptance), best.poles, terms, iterations=steps)
         step, std = frequency_changes(best.system)
         if not poles_are_held:
-            step = step - np.average(step, weights=std**-2)
+            step = step - np.average(step, weights=_weights(change + step, std))
         if np.all(np.abs(step) < CONVERGED * std):
             break
     gain = fit.misfit - best.misfit
     if gain < penalty or gain < MIN_EXPLAINED * excess:
         return None
-    return Drift(relative_change=change, std=std, receptance=receptance), best
+    mean_std = 0.0 if poles_are_held else float(_weights(change, std).sum() ** -0.5)
+    return Drift(relative_change=change, std=std, receptance=receptance, mean_std=mean_std), best
+
+
+def _weights(change: FloatArray, std: FloatArray) -> FloatArray:
+    """Weigh changes by the variance of the drift and of their noise, (n_frfs,)."""
+    drift = max(float(np.var(change, ddof=1) - np.mean(std**2)), 0.0)
+    return np.asarray(1 / (drift + std**2))
 
 
 def _at_mean_frequencies(

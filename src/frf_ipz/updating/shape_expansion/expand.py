@@ -8,7 +8,7 @@ out. Only an update that takes care is replaced, and only by an expansion that p
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from frf_ipz.control_margins import GAIN_MARGIN_DB, HALF, SIXTH
 from frf_ipz.late_imports import import_late
 from frf_ipz.pairing.pairs import Pair, Pairs, PairVerdict
 from frf_ipz.rational import natural_frequency_hz
-from frf_ipz.updating.expansion import ShapeExpansion, points_apart
+from frf_ipz.updating.expansion import ShapeExpansion
 from frf_ipz.updating.scale import fit_scale
 from frf_ipz.updating.shape_expansion.attached_masses import attachment_places, find_attached_masses
 from frf_ipz.updating.shape_expansion.between_points import inner_points
@@ -28,11 +28,10 @@ from frf_ipz.updating.shape_expansion.left_out_points import (
     errors_at_points,
     leave_points_out,
 )
-from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes, side_with_more
+from frf_ipz.updating.shape_expansion.measured_shapes import gains_of_frfs, measured_shapes, side_with_more
+from frf_ipz.updating.shape_expansion.wrong_gains import WrongGain, find_wrong_gains
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import pandas as pd
 
     from frf_ipz.arrays import BoolArray
@@ -48,6 +47,7 @@ else:
     pd = import_late("pandas")
 
 MOST_ENDS = 100  # sensors and excited DOFs
+NO_GAIN = WrongGain(log_gain=0.0, std=0.0)
 
 
 def with_expanded_shapes(
@@ -89,11 +89,10 @@ def with_expanded_shapes(
         return updated
     is_known = fit.unknown_scale == "none"
     places = attachment_places(problem.model, measured, geometry)
-    loaded, left_out = _best_cause(fit, problem.model, measured, places, {})
-    doubts = _find_doubts(fit, loaded, left_out) if left_out is not None and is_known else {}
-    if doubts:
-        measured = measured_shapes(fit, doubts=doubts) or measured
-        loaded, left_out = _best_cause(fit, problem.model, measured, places, doubts)
+    _, is_inner = inner_points(side_with_more(fit), side_with_more(fit), problem.model.expanded_dofs, geometry)
+    between = tuple(point for point, lies_inside in zip(side_with_more(fit), is_inner, strict=True) if lies_inside)
+    causes = _find_causes(fit, problem.model, measured, tuple(dict.fromkeys(((), places))), between)
+    loaded, measured, wrong_gains, left_out = min(causes, key=lambda cause: cause.error_db)
     if left_out is None or np.median(left_out.error_db) >= own_db:
         return updated
     modes = expand_modes(loaded.model, measured, error=loaded.error, is_scale_known=is_known)
@@ -104,9 +103,11 @@ def with_expanded_shapes(
     model, ensemble = build_expanded_model(
         loaded.model, modes, count=options.ensemble, calibration=anywhere, seed=options.seed
     )
+    gains = [wrong_gains.get(point, NO_GAIN) for point in left_out.points]
+    corrected = replace(fit, gain=gains_of_frfs(fit, wrong_gains)) if wrong_gains else fit
     expansion = ShapeExpansion(
         points=tuple(point.name for point in left_out.points),
-        ratio=np.exp(left_out.log_ratio),
+        ratio=np.exp(left_out.log_ratio + [gain.log_gain for gain in gains]),
         error_db=left_out.error_db,
         updated_error_db=own[np.isfinite(own)],
         stiffness_ratio=loaded.stiffness_ratio,
@@ -115,6 +116,7 @@ def with_expanded_shapes(
         is_level_known=is_known,
         inner_nodes=inner_nodes,
         inner_spread=inner / anywhere,
+        wrong_gains=tuple((point.name, gain.log_gain, gain.std) for point, gain in wrong_gains.items()),
         reciprocal_spread=calibrate(left_out.reciprocal) / anywhere if left_out.reciprocal else 1.0,
     )
     return replace(
@@ -124,46 +126,49 @@ def with_expanded_shapes(
         ensemble=ensemble,
         unmet=(),
         parts=pd.DataFrame(),
-        scale=fit_scale(fit, _pairs_of_measured_modes(fit), model, fit.model.poles[: fit.n_modes], ensemble),
+        scale=fit_scale(corrected, _pairs_of_measured_modes(fit), model, fit.model.poles[: fit.n_modes], ensemble),
         expansion=expansion,
     )
 
 
-def _best_cause(
+class _Cause(NamedTuple):
+    """What is taken to be wrong: masses that the model lacks, gains of the test; and how points then follow."""
+
+    loaded: LoadedModel
+    measured: MeasuredShapes
+    wrong_gains: dict[AnyDof, WrongGain]
+    left_out: LeftOutPoints | None
+
+    @property
+    def error_db(self) -> float:
+        """How well left-out points follow from the others."""
+        return np.inf if self.left_out is None else float(np.median(self.left_out.error_db))
+
+
+def _find_causes(
     fit: ModalFit,
     model: ReducedModel,
     measured: MeasuredShapes,
-    places: tuple[AnyDof, ...],
-    doubts: Mapping[AnyDof, float],
-) -> tuple[LoadedModel, LeftOutPoints | None]:
-    """Take the model as it is or with attached masses: where left-out points follow better from the others."""
-    causes = [find_attached_masses(model, measured, tried) for tried in dict.fromkeys(((), places))]
-    left_out_of = [leave_points_out(fit, loaded.model, error=loaded.error, doubts=doubts) for loaded in causes]
-    errors = [np.inf if left_out is None else float(np.median(left_out.error_db)) for left_out in left_out_of]
-    best = int(np.argmin(errors))
-    return causes[best], left_out_of[best]
+    causes: tuple[tuple[AnyDof, ...], ...],
+    between: tuple[AnyDof, ...],
+) -> list[_Cause]:
+    """Find masses at the places of each cause, and gains that are wrong whatever the cause.
 
-
-def _find_doubts(fit: ModalFit, loaded: LoadedModel, left_out: LeftOutPoints) -> dict[AnyDof, float]:
-    """Relative errors of points that all others contradict: what they are off by, so that they hardly count.
-
-    A wrong point spoils what is predicted at its neighbours. So the one that is off most is doubted first, and stays so
-    where it stands apart from what the others then are off by.
+    Each spoils what the other is found from, so masses are found again once gains are known.
     """
-    doubts: dict[AnyDof, float] = {}
-    judged: LeftOutPoints | None = left_out
-    while judged is not None:
-        sizes = np.abs(points_apart(judged.log_ratio)[0])
-        places = [place for place, point in enumerate(judged.points) if point not in doubts]
-        if not places:
-            break
-        worst = max(places, key=sizes.__getitem__)
-        tried = {**doubts, judged.points[worst]: float(sizes[worst])}
-        judged = leave_points_out(fit, loaded.model, error=loaded.error, doubts=tried)
-        if judged is None or not points_apart(judged.log_ratio)[2][worst]:
-            break
-        doubts = tried
-    return doubts
+    loaded = [find_attached_masses(model, measured, places) for places in causes]
+    wrong: list[dict[AnyDof, WrongGain]] = [{} for _ in causes]
+    if between and fit.unknown_scale == "none":
+        wrong = [find_wrong_gains(each.model, measured, between) for each in loaded]
+        common = set.intersection(*(set(each) for each in wrong))
+        wrong = [{point: gain for point, gain in each.items() if point in common} for each in wrong]
+    found = []
+    for places, each, gains in zip(causes, loaded, wrong, strict=True):
+        corrected = measured_shapes(fit, wrong_gains=gains) if gains else None
+        cause = each if corrected is None else find_attached_masses(model, corrected, places)
+        left_out = leave_points_out(fit, cause.model, error=cause.error, wrong_gains=gains)
+        found.append(_Cause(cause, corrected or measured, gains, left_out))
+    return found
 
 
 def _calibrations(left_out: LeftOutPoints, is_inner: BoolArray) -> tuple[float, float]:

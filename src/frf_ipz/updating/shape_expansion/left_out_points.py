@@ -13,7 +13,7 @@ from frf_ipz.arrays import BoolArray, FloatArray
 from frf_ipz.numerics.noise_floor import above_noise
 from frf_ipz.pairing.poles import measured_amplitudes
 from frf_ipz.updating.shape_expansion.expanded_model import expand_modes, receptance
-from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes, side_with_more
+from frf_ipz.updating.shape_expansion.measured_shapes import gains_of_frfs, measured_shapes, side_with_more
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import AnyDof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.structure import ReducedModel
+    from frf_ipz.updating.shape_expansion.wrong_gains import WrongGain
     from frf_ipz.updating.updated_model import UpdatedModel
 
 LINES = 300  # of the band, at equal ratios
@@ -106,7 +107,7 @@ class LeftOutPoints:
 
 
 def leave_points_out(
-    fit: ModalFit, model: ReducedModel, *, error: float, doubts: Mapping[AnyDof, float] | None = None
+    fit: ModalFit, model: ReducedModel, *, error: float, wrong_gains: Mapping[AnyDof, WrongGain] | None = None
 ) -> LeftOutPoints | None:
     """Predict each measured point from the others.
 
@@ -118,8 +119,8 @@ def leave_points_out(
         The model over which shapes are expanded.
     error : float
         Relative error of the measured amplitudes.
-    doubts : mapping of Dof or PortDof to float, optional
-        Relative errors of single points beside that.
+    wrong_gains : mapping of Dof or PortDof to WrongGain, optional
+        Taken off what was measured at these points.
 
     Returns
     -------
@@ -131,8 +132,8 @@ def leave_points_out(
         return None
     chosen = [points[place] for place in np.unique(np.linspace(0, len(points) - 1, MOST).round().astype(int))]
     s = _lines(fit)
-    measured = _heard(fit, s)
-    judge = partial(_judge, fit, model, error=error, doubts=doubts or {}, s=s, measured=measured)
+    measured = _heard(fit, s) / gains_of_frfs(fit, wrong_gains or {}) * gains_of_frfs(fit, {})
+    judge = partial(_judge, fit, model, error=error, wrong_gains=wrong_gains or {}, s=s, measured=measured)
     judged = {point: judge(point, _without(fit, point)) for point in chosen}
     known = {point: judgement for point, judgement in judged.items() if judgement is not None}
     if not known:
@@ -227,13 +228,13 @@ def _judge(
     kept: BoolArray,
     *,
     error: float,
-    doubts: Mapping[AnyDof, float],
+    wrong_gains: Mapping[AnyDof, WrongGain],
     s: ComplexArray,
     measured: ComplexArray,
 ) -> _Judgement | None:
     """Predict a point from the FRFs that are kept; None where they do not tell it."""
     is_output, ends = _ends(fit, point)
-    others = measured_shapes(fit, kept=kept, doubts=doubts)
+    others = measured_shapes(fit, kept=kept, wrong_gains=wrong_gains)
     if others is None:
         return None
     is_known = fit.unknown_scale == "none"
@@ -254,7 +255,7 @@ def _judge(
         rest = row * (model.row(partner) @ modes.model.shapes)
         predicted.append(receptance(modes, at_point, at_partner, rest, s) * s ** fit.labels[number].quantity.power)
         at_partners.append(at_partner)
-    amplitudes = (measured_amplitudes(fit)[0].real / (fit.gain if is_known else 1.0))[:, frfs]
+    amplitudes = (measured_amplitudes(fit)[0].real / gains_of_frfs(fit, wrong_gains))[:, frfs]
     partners = np.stack(at_partners, axis=1)
     shape = np.sum(amplitudes * partners, axis=1) / np.maximum(np.sum(partners**2, axis=1), np.finfo(float).tiny)
     large = np.abs(at_point) >= np.median(np.abs(at_point))
@@ -264,7 +265,7 @@ def _judge(
         errors=ShapeErrors(
             difference=shape - at_point,
             variance=variance,
-            own_variance=(error**2 + doubts.get(point, 0.0) ** 2) * at_point**2,
+            own_variance=(error**2 + (wrong_gains[point].std ** 2 if point in wrong_gains else 0.0)) * at_point**2,
         ),
     )
 

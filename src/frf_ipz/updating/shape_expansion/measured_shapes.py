@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
     from frf_ipz.dofs import AnyDof
     from frf_ipz.identification.modal_fit import ModalFit
+    from frf_ipz.updating.shape_expansion.wrong_gains import WrongGain
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,7 +43,7 @@ class MeasuredShapes:
     noise : (n_modes,) array
         Relative variance of the amplitudes of a mode.
     doubt : (n_outputs + n_inputs,) array
-        Relative variance of what was measured at one point, beside that of all.
+        Relative variance of the gain of a point, where a wrong one was taken off.
     """
 
     outputs: tuple[AnyDof, ...]
@@ -66,7 +67,7 @@ class MeasuredShapes:
 
 
 def measured_shapes(
-    fit: ModalFit, *, kept: BoolArray | None = None, doubts: Mapping[AnyDof, float] | None = None
+    fit: ModalFit, *, kept: BoolArray | None = None, wrong_gains: Mapping[AnyDof, WrongGain] | None = None
 ) -> MeasuredShapes | None:
     """Take the shapes out of a fit.
 
@@ -76,8 +77,8 @@ def measured_shapes(
         Of FRFs.
     kept : (n_frfs,) bool array, optional
         FRFs to take them from; all where it is left out.
-    doubts : mapping of Dof or PortDof to float, optional
-        Relative errors of points of the side that has more of them.
+    wrong_gains : mapping of Dof or PortDof to WrongGain, optional
+        Of points of the side that has more of them; they are taken off.
 
     Returns
     -------
@@ -96,10 +97,11 @@ def measured_shapes(
     if not _are_joined(rows, columns):
         return None
     amplitudes, std = (values[:, kept] for values in measured_amplitudes(fit))
-    gain = np.abs(fit.gain[kept]) if fit.unknown_scale == "none" else np.ones(len(labels))
-    doubted = outputs if side_with_more(fit) == _sides(fit)[0] else inputs
+    wrong = wrong_gains or {}
+    gain = np.abs(gains_of_frfs(fit, wrong)[kept])
+    more = side_with_more(fit)
     doubt = np.concatenate(
-        [[(doubts or {}).get(dof, 0.0) ** 2 if side is doubted else 0.0 for dof in side] for side in (outputs, inputs)]
+        [[wrong[dof].std ** 2 if dof in wrong and side == more else 0.0 for dof in side] for side in (outputs, inputs)]
     )
     products = [_leading_product(mode, rows, columns) for mode in (amplitudes / gain).real]
     return MeasuredShapes(
@@ -112,6 +114,27 @@ def measured_shapes(
         noise=np.mean((std / gain) ** 2, axis=1) / np.maximum(np.mean(np.abs(amplitudes / gain) ** 2, axis=1), 1e-300),
         doubt=doubt,
     )
+
+
+def gains_of_frfs(fit: ModalFit, wrong_gains: Mapping[AnyDof, WrongGain]) -> FloatArray:
+    """Give the gain of each FRF, as far as it is known.
+
+    Parameters
+    ----------
+    fit : ModalFit
+        The test.
+    wrong_gains : mapping of Dof or PortDof to WrongGain
+        Of points of the side that has more of them.
+
+    Returns
+    -------
+    (n_frfs,) array
+        What amplitudes are to be divided by.
+    """
+    gain = fit.gain if fit.unknown_scale == "none" else np.ones(len(fit.labels))
+    is_output = side_with_more(fit) == _sides(fit)[0]
+    ends = [label.output_dof if is_output else label.input_dof for label in fit.labels]
+    return np.asarray(gain * np.exp([wrong_gains[end].log_gain if end in wrong_gains else 0.0 for end in ends]))
 
 
 def side_with_more(fit: ModalFit) -> tuple[AnyDof, ...]:

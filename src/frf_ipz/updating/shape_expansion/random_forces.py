@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from frf_ipz.updating.shape_expansion.measured_shapes import MeasuredShapes
 
 
+LEAST_DAMPING = 1e-6  # where none is measured: a mode of the model at the very frequency would have no bound
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ModalModel:
     """A reduced model in its modes.
@@ -97,6 +100,80 @@ class ExpandedShape:
     log_evidence: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FieldAtPoints:
+    """What random forces drive at the frequency of a measured mode, at sensors and excited DOFs, in a unit of its own.
+
+    Parameters
+    ----------
+    rows : (n_outputs + n_inputs, m) array
+        Shapes of the model there.
+    power : (m,) array
+        Variance of the amplitude of each of its modes.
+    prior : (n_outputs + n_inputs, n_outputs + n_inputs) array
+        Covariance of the motion.
+    unit_variance : (n_outputs + n_inputs,) array
+        Of an error of 100 % of the typical motion of a side.
+    own : (n_outputs + n_inputs,) array
+        Relative variance of noise and of doubted points.
+    """
+
+    rows: FloatArray
+    power: FloatArray
+    prior: FloatArray
+    unit_variance: FloatArray
+    own: FloatArray
+
+    def error_variance(self, error: float) -> FloatArray:
+        """Variance of what is measured beside the field.
+
+        Parameters
+        ----------
+        error : float
+            Relative, of each measured amplitude beside its noise.
+
+        Returns
+        -------
+        (n_outputs + n_inputs,) array
+            In the unit of `prior`.
+        """
+        return np.asarray(self.unit_variance * (error**2 + self.own))
+
+
+def field_at_points(model: ModalModel, measured: MeasuredShapes, mode: int) -> FieldAtPoints:
+    """Tell what random forces drive at the frequency of a measured mode.
+
+    Parameters
+    ----------
+    model : ModalModel
+        The model in its modes.
+    measured : MeasuredShapes
+        Shapes at sensors and excited DOFs.
+    mode : int
+        Which one.
+
+    Returns
+    -------
+    FieldAtPoints
+        Before anything is known of its shape.
+    """
+    rows = np.vstack([model.outputs, model.inputs])
+    count, n_outputs = len(rows), len(model.outputs)
+    omega, damping = measured.omega[mode], max(float(measured.damping[mode]), LEAST_DAMPING)
+    power = 1 / np.abs(model.omega**2 - omega**2 + 2j * damping * model.omega * omega) ** 2
+    power = power / np.mean((rows**2) @ power)
+    prior = (rows * power) @ rows.T
+    sizes = np.diag(prior)
+    unit = [np.full(n_outputs, sizes[:n_outputs].mean()), np.full(count - n_outputs, sizes[n_outputs:].mean())]
+    return FieldAtPoints(
+        rows=rows,
+        power=power,
+        prior=prior,
+        unit_variance=np.concatenate(unit),
+        own=measured.noise[mode] + measured.doubt,
+    )
+
+
 def expand_shape(model: ModalModel, measured: MeasuredShapes, mode: int, error: float) -> ExpandedShape:
     """Expand a measured mode over a model.
 
@@ -116,17 +193,10 @@ def expand_shape(model: ModalModel, measured: MeasuredShapes, mode: int, error: 
     ExpandedShape
         The mean of the field given what was measured, and its covariance.
     """
-    rows = np.vstack([model.outputs, model.inputs])
+    field = field_at_points(model, measured, mode)
+    rows, power = field.rows, field.power
     count, n_outputs = len(rows), len(model.outputs)
-    omega, damping = measured.omega[mode], max(float(measured.damping[mode]), 1e-6)
-    power = 1 / np.abs(model.omega**2 - omega**2 + 2j * damping * model.omega * omega) ** 2
-    power = power / np.mean((rows**2) @ power)
-    prior = (rows * power) @ rows.T
-    sizes = np.diag(prior)
-    noise = np.concatenate(
-        [np.full(n_outputs, sizes[:n_outputs].mean()), np.full(count - n_outputs, sizes[n_outputs:].mean())]
-    )
-    factor = linalg.cho_factor(prior + np.diag(noise * (error**2 + measured.noise[mode] + measured.doubt)), lower=True)
+    factor = linalg.cho_factor(field.prior + np.diag(field.error_variance(error)), lower=True)
     output = np.concatenate([measured.at_outputs[mode], np.zeros(count - n_outputs)])
     force = np.concatenate([np.zeros(n_outputs), measured.at_inputs[mode]])
     by_output, by_force = linalg.cho_solve(factor, output), linalg.cho_solve(factor, force)
