@@ -191,13 +191,11 @@ class _Receptance:
     def newton_step(self, outputs: FloatArray, inputs: FloatArray, s: ComplexArray) -> ComplexArray:
         """Step from s (n,) to the zero, where the rows of sensors and excitations change by (n, r) arrays."""
         residues = ((self.outputs + outputs) @ self.right) * ((self.inputs + inputs) @ self.left)
-        terms = residues / (s[:, None] - self.poles), residues.conj() / (s[:, None] - self.poles.conj())
-        value = terms[0].sum(axis=1) + terms[1].sum(axis=1)
-        slopes = [
-            term / (s[:, None] - poles) for term, poles in zip(terms, (self.poles, self.poles.conj()), strict=True)
-        ]
-        slope = -slopes[0].sum(axis=1) - slopes[1].sum(axis=1)
-        return np.divide(-value, slope, out=np.zeros_like(value), where=slope != 0)
+        nearness = 1 / (s[:, None] - np.concatenate([self.poles, self.poles.conj()]))
+        terms = np.hstack([residues, residues.conj()]) * nearness
+        value, slope = terms.sum(axis=1), -np.sum(terms * nearness, axis=1)
+        step: ComplexArray = np.divide(-value, slope, out=np.zeros_like(value), where=slope != 0)
+        return step
 
 
 def _output(label: FrfLabel) -> AnyDof:
