@@ -786,7 +786,7 @@ def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: Fl
     return scales
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class _ScaleSearch:
     """Minus the logarithm of the evidence, by the logarithms of the free scales.
 
@@ -803,33 +803,19 @@ class _ScaleSearch:
     def _center(self) -> FloatArray:
         return np.log([term.std for term in self.terms])[self.free]
 
-    @cached_property
-    def covariance(self) -> FloatArray:
-        """Prior covariance of the logarithms: an own part of each, and what all share."""
-        own, shared = (
-            np.array([getattr(term, name) for term in self.terms])[self.free]
-            for name in ("scale_uncertainty", "shared_uncertainty")
-        )
-        return np.asarray(np.diag(own**2) + np.outer(shared, shared))
-
-    @cached_property
-    def precision(self) -> FloatArray:
-        """Its inverse."""
-        return np.asarray(np.linalg.inv(self.covariance))
-
     @property
-    def _reach(self) -> FloatArray:
-        return np.asarray(MAX_DEVIATION * np.sqrt(np.diagonal(self.covariance)))
+    def _spread(self) -> FloatArray:
+        return np.array([term.scale_uncertainty for term in self.terms])[self.free]
 
     @property
     def low(self) -> FloatArray:
         """Least logarithms."""
-        return np.asarray(self._center - self._reach)
+        return np.asarray(self._center - MAX_DEVIATION * self._spread)
 
     @property
     def high(self) -> FloatArray:
         """Largest logarithms."""
-        return np.asarray(self._center + self._reach)
+        return np.asarray(self._center + MAX_DEVIATION * self._spread)
 
     def step(self, logs: FloatArray, slope: FloatArray, curvature: FloatArray) -> FloatArray:
         """Newton's step of the scales that are not at an end of their range."""
@@ -854,15 +840,15 @@ class _ScaleSearch:
         mean = cho_solve((root, False), right, check_finite=False)
         weights = 1 / (linear.level + factor**2)
         value = 0.5 * float(weights @ linear.data**2 - right @ mean) + float(np.log(np.diagonal(root)).sum())
-        pull = self.precision @ (logs - self._center)
-        value += 0.5 * float(pull @ (logs - self._center)) - 0.5 * float(np.log(weights).sum())
+        deviation = (logs - self._center) / self._spread
+        value += 0.5 * float(deviation @ deviation) - 0.5 * float(np.log(weights).sum())
         return _Evidence(
             value=value,
             search=self,
             scales=scales[:count],
             factor=factor,
             of_slack=has_slack and bool(self.free[-1]),
-            pull=pull,
+            deviation=deviation,
             root=root,
             mean=mean,
             weights=weights,
@@ -878,7 +864,7 @@ class _Evidence:
     scales: FloatArray
     factor: float
     of_slack: bool
-    pull: FloatArray
+    deviation: FloatArray
     root: FloatArray
     mean: FloatArray
     weights: FloatArray
@@ -917,7 +903,7 @@ class _Evidence:
             error = np.append(-self.mean, 1.0)
             misfit = float(error @ self._by_slack @ error)
             slope[-1] = self.factor**2 * (float(self.weights.sum()) * (1 - self._share) - misfit)
-        return np.asarray(slope[search.free] + self.pull)
+        return np.asarray(slope[search.free] + self.deviation / search._spread)
 
     def curvature(self) -> FloatArray:
         """Give the expected curvature."""
@@ -931,7 +917,7 @@ class _Evidence:
             curvature[number, number] += 2 * float(size - 2 * np.trace(covariance[place, place]))
         if self.of_slack:
             curvature[-1] = curvature[:, -1] = self._row_of_slack()
-        return np.asarray(curvature[np.ix_(search.free, search.free)] + search.precision)
+        return np.asarray(curvature[np.ix_(search.free, search.free)] + np.diag(1 / search._spread**2))
 
     def _row_of_slack(self) -> FloatArray:
         square, told = self.factor**2, self._by_slack[:-1, :-1]

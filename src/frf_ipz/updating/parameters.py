@@ -40,7 +40,6 @@ GENERIC_STD_ALONE = 0.05  # of the same where the model has no parts
 SENSOR_KG = 2e-3  # of the mass of a sensor that the model does not contain: accelerometers weigh some grams
 MASS_STD = 0.02  # masses are known better than stiffness
 SCALE_UNCERTAINTY = 1.0  # standard deviation of the logarithm of each of these: the data may ask for others
-MODEL_UNCERTAINTY = 2.0  # of what these logarithms share: all of a model may be nearly right, or far off
 SAME_POSITION = 1e-9  # of the variance, by which two parts at one position differ, so that it has a root
 FREE_MODES = 24  # a change among higher modes hardly moves what was measured, where the band holds fewer
 MOST_FREE_MODES = 48  # of a model with more modes in its basis: a change of each pair is a matrix to be kept
@@ -60,15 +59,12 @@ class PriorTerm(Concise):
         Standard deviation before the data are seen.
     scale_uncertainty : float
         Standard deviation of the logarithm of `std`; 0 fixes it.
-    shared_uncertainty : float
-        Standard deviation of what this logarithm has in common with those of other terms, in units of its own share.
     """
 
     name: str
     root: FloatArray
     std: float
     scale_uncertainty: float = SCALE_UNCERTAINTY
-    shared_uncertainty: float = 0.0
 
     def by_whitened(self, slopes: FloatArray) -> FloatArray:
         """Turn derivatives by parameters into those by this term's unit normal numbers, for a `std` of 1.
@@ -219,17 +215,11 @@ def generic_basis(model: ReducedModel, *, std: float = GENERIC_STD_ALONE, common
             matrix += matrix.T.copy()
     diagonal, unchanged = first == second, np.zeros(stiffness.shape)  # which takes no memory: nothing is written there
     roots = [
-        PriorTerm(
-            name="any change of the stiffness",
-            root=np.diag(np.where(diagonal, np.sqrt(2.0), 1.0)),
-            std=std,
-            shared_uncertainty=MODEL_UNCERTAINTY,
-        )
+        PriorTerm(name="any change of the stiffness", root=np.diag(np.where(diagonal, np.sqrt(2.0), 1.0)), std=std)
     ]
     if common:
         roots.insert(
-            0,
-            _of_model(name="a factor on the stiffness", root=np.asarray(diagonal[:, None], float), std=GLOBAL_STD),
+            0, PriorTerm(name="a factor on the stiffness", root=np.asarray(diagonal[:, None], float), std=GLOBAL_STD)
         )
     return ParameterBasis(
         names=tuple(f"stiffness {i + 1}-{j + 1}" for i, j in zip(first, second, strict=True)),
@@ -359,11 +349,6 @@ def unwhiten(terms: tuple[PriorTerm, ...], scales: FloatArray, whitened: FloatAr
     return np.asarray(whitened @ root.T)
 
 
-def _of_model(*, name: str, root: FloatArray, std: float) -> PriorTerm:
-    """Make a term of what a modeller does not know: how well all of a model is made is common to such terms."""
-    return PriorTerm(name=name, root=root, std=std, shared_uncertainty=MODEL_UNCERTAINTY)
-
-
 def _sensor_basis(model: ReducedModel, sensors: Sequence[AnyDof]) -> ParameterBasis:
     """Mass of each sensor, kg; without those that measure a rotation."""
     dofs = [dof for dof in dict.fromkeys(dof.unsigned for dof in sensors) if not dof.direction.startswith("r")]
@@ -399,16 +384,9 @@ def _distance_terms(regions: tuple[Region, ...], scale: float, what: str) -> tup
     positions = np.array([region.coordinates_m for region in regions])
     extent = max(float(np.ptp(positions, axis=0).max()), np.finfo(float).tiny)
     distance = np.sqrt(sum(np.subtract.outer(axis, axis) ** 2 for axis in positions.T)) / extent
-    terms = [
-        PriorTerm(
-            name=f"a factor on the {what}",
-            root=np.ones((len(regions), 1)),
-            std=GLOBAL_STD * scale,
-            shared_uncertainty=MODEL_UNCERTAINTY,
-        )
-    ]
+    terms = [PriorTerm(name=f"a factor on the {what}", root=np.ones((len(regions), 1)), std=GLOBAL_STD * scale)]
     for length in SEGMENT_LENGTHS:
         correlation = np.exp(-distance / length) + SAME_POSITION * np.eye(len(regions))
         root = np.asarray(np.linalg.cholesky(correlation), np.float64)
-        terms.append(_of_model(name=f"{what} along {length:.0%} of the structure", root=root, std=SEGMENT_STD * scale))
+        terms.append(PriorTerm(name=f"{what} along {length:.0%} of the structure", root=root, std=SEGMENT_STD * scale))
     return tuple(terms)

@@ -63,9 +63,10 @@ def lacking():
 
 
 def test_a_model_that_can_express_the_measurement_keeps_a_narrow_band(sound):
-    prediction, _, truth = sound
+    prediction, by_ensemble, truth = sound
     assert share_inside(prediction, truth) > 0.75
-    assert half_width_db(prediction) < 20 * np.log10(1 + NOISE)  # of a line
+    assert half_width_db(prediction) < 0.05
+    assert half_width_db(prediction) < 1.2 * half_width_db(by_ensemble)
 
 
 def test_a_model_that_lacks_a_mass_has_a_band_that_holds_the_truth(lacking, sound):
