@@ -21,7 +21,7 @@ from frf_ipz.identification.root_covariance import RootCovariance
 from frf_ipz.numerics.damped_modes import damped_modes
 from frf_ipz.numerics.pole_forms import damped_form
 
-DRAWS, SEED = 16, 0  # of all positions; of a variance a third is known by them, where any is far better than none
+DRAWS, SEED = 32, 0  # of all positions: the root of a mean square of so many is known to a third
 SOFT = 1e-3  # of the lowest zero: frequency given to rigid-body modes, whose double poles at 0 have no residues
 
 if TYPE_CHECKING:

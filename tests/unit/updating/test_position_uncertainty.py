@@ -15,6 +15,7 @@ SEEDS = (20, 12)  # a plate and a frame
 SMALL = 1e-5  # of a row: the terms of second order are as small
 SECOND_ORDER = 1e-3  # of the largest move
 TOLERANCE = 1e-3  # m/m, as stated by default
+DRAWS = 100
 
 
 @pytest.fixture(params=SEEDS, scope="module")
@@ -59,6 +60,41 @@ def _newton(model, output, force, zero):
         motion, across = np.linalg.solve(dynamic, force), np.linalg.solve(dynamic.T, output)
         zero -= (output @ motion) / -(across @ (2 * zero * model.mass + model.damping) @ motion)
     return zero
+
+
+def test_what_zeros_miss_of_the_first_order_is_their_own_noise(case):
+    off = propagate_position_tolerance(
+        case.fit, case.reduced_model, fe_model=case.structure.nominal_model, tolerance_m_per_m=TOLERANCE
+    )
+    problem = make_problem(case.reduced_model, case.fit, case.pairs, None)
+    problem = replace(problem, covariance=np.zeros_like(problem.covariance))
+    small = tuple(replace(position, row=SMALL * position.row) for position in off)
+    first_order = with_position_uncertainty(problem, small) / SMALL**2
+    stated = np.diagonal(with_position_uncertainty(problem, off) - first_order)
+    missed = np.empty((DRAWS, len(problem.values)), complex)
+    for draw, white in enumerate(np.random.default_rng(3).standard_normal((DRAWS, len(off)))):
+        moves = [_with_all(problem, off, size * white) - problem.computed for size in (1.0, SMALL)]
+        missed[draw] = moves[0] - moves[1] / SMALL
+    expected = np.stack([np.mean(missed.real**2, axis=0), np.mean(missed.imag**2, axis=0)], axis=1).ravel()
+    is_seen = expected > 1e-9 * np.diagonal(first_order).max()
+    assert is_seen.any()
+    ratio = np.sqrt(stated[is_seen] / expected[is_seen])
+    assert np.all((ratio > 0.5) & (ratio < 2)), ratio
+
+
+def _with_all(problem, off, white):
+    """Zeros with all positions off at once."""
+    rows = {True: {}, False: {}}
+    for position, size in zip(off, white, strict=True):
+        at = rows[position.is_output]
+        at[position.dof] = at.get(position.dof, 0.0) + size * position.row
+    values = problem.computed.copy()
+    for target in np.flatnonzero(problem.frf >= 0):
+        output, force = problem.rows(int(problem.frf[target]))
+        label = problem.labels[int(problem.frf[target])]
+        output, force = output + rows[True].get(label.output_dof, 0.0), force + rows[False].get(label.input_dof, 0.0)
+        values[target] = _newton(problem.model, output, force, values[target])
+    return values
 
 
 def test_a_position_tolerance_makes_zeros_less_certain_and_not_poles():
