@@ -20,19 +20,19 @@ class Curve:
     def __init__(self, curvature):
         self.curvature = curvature
 
-    def roots(self, theta, reference):
+    def roots(self, theta, _reference):
         return theta
 
     def errors(self, tracked):
         return TARGET - tracked - self.curvature * tracked**2
 
-    def slopes(self, theta, tracked):
+    def slopes(self, theta, _tracked):
         return np.array([1 + 2 * self.curvature * theta])
 
-    def history_columns(self, theta):
+    def history_columns(self, _theta):
         return {}
 
-    def max_step_fraction(self, theta, proposed):
+    def max_step_fraction(self, _theta, _proposed):
         return 1.0
 
 
