@@ -231,6 +231,18 @@ def test_the_search_for_scales_stays_within_reason(size):
     assert np.all(np.abs(np.log(scales / 0.1)) <= 6.0 + 1e-9)
 
 
+def test_scales_so_large_that_rounding_takes_the_prior_are_passed_over():
+    """Data ten thousand times larger than expected, known to all digits, of fewer combinations than parameters."""
+    rng = np.random.default_rng(3)
+    sensitivity, data = rng.standard_normal((5, 8)), 1e4 * rng.standard_normal(5)
+    terms = [PriorTerm(name="parameters", root=np.eye(8), std=0.5)]
+    noise = noise_of(1e-20 * np.eye(5))
+    linear = linearise([sensitivity], data, noise, scales=np.full(1, 0.5), combining=False)
+    with pytest.raises(np.linalg.LinAlgError):
+        linear.information(np.full(1, 1e3), 0.0)
+    assert 10 < most_likely_scales(linear, terms, np.full(1, 0.5))[0] < 1e3
+
+
 def test_what_no_datum_moves_keeps_its_prior_and_takes_no_column():
     """Sixty parameters of which the data see three combinations, and a fourth too faintly to matter."""
     rng = np.random.default_rng(5)
