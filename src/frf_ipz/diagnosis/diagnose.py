@@ -648,7 +648,8 @@ def _judge(diagnosis: Diagnosis, decision: Decision, found: str, *, is_searched:
             return f"{found} With that and the measured damping, the model explains the measurement."
         return "With the measured damping, the model explains the measurement."
     partly = f" {found}" if found else ""
-    return f"Something is missing that nothing in the catalogue explains: {diagnosis.unexplained_part}.{partly}"
+    looked_at = "of what was looked at" if decision.not_searched else "in the catalogue"
+    return f"Something is missing that nothing {looked_at} explains: {diagnosis.unexplained_part}.{partly}"
 
 
 def _collect_numbers(decision: Decision) -> dict[str, float]:

@@ -1,5 +1,7 @@
 """What a diagnosis says agrees with its numbers: intervals, probabilities, and no facts where something remains."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -80,3 +82,5 @@ def test_where_something_remains_a_part_only_looks_like_something(nominal):
     assert all(finding.statement.startswith(APPEARANCE) for finding in diagnosis.findings)
     assert all("among what was tried)" in finding.statement for finding in diagnosis.findings)
     assert diagnosis.statement.startswith("Something is missing that nothing in the catalogue explains: ")
+    hasty = diagnose(observed(measured(changed)), nominal, options=replace(options, seconds=1e-3))
+    assert hasty.statement.startswith("Something is missing that nothing of what was looked at explains: ")

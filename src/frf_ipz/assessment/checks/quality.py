@@ -210,6 +210,9 @@ def diagnosis(evidence: Evidence) -> Iterator[Check]:
                 "not looked for: a diagnosis compares FRFs, and modes do not tell what the model leaves out",
                 "",
             )
+    elif not found.is_explained and not found.is_complete:
+        says = "something is missing in the model; the time was over before all that may explain it was looked at"
+        verdict, advice = Verdict.WITH_CARE, "frf-ipz diagnose looks for the cause without a limit of time"
     elif not found.is_explained:
         says, verdict = "something is missing in the model that no known effect explains", Verdict.WITH_CARE
         advice = "see the section on the diagnosis"
