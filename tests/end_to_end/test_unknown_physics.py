@@ -8,7 +8,7 @@ import frf_ipz
 from frf_testbench.simulator.cases.case import make_case
 
 SEED, KIND = 812_024, "unknown:rotary_inertia"
-TRIED = '\n[diagnose]\neffects = ["added_mass", "boundary_compliance"]\n'
+TRIED = '\n[diagnose]\neffects = ["added_mass", "boundary_compliance"]\nseconds = 600\n'
 APPEARANCE = "A part of it looks like this, and need not be: "
 ALTERNATIVE = re.compile(r"<tr>(?:(?!</tr>).)*<td>alternative</td>.*?</tr>", re.DOTALL)
 FACTS = ("A mass of", "The right end is not rigidly held", "The left end is not rigidly held")

@@ -32,7 +32,7 @@ from frf_ipz.diagnosis.nonlinear.search import MIN_LOG_BAYES_FACTOR as LAW_NATS
 from frf_ipz.diagnosis.nonlinear.search import search_laws
 from frf_ipz.diagnosis.observations import Observations, observe
 from frf_ipz.diagnosis.options import DiagnoseOptions
-from frf_ipz.diagnosis.result import Ambiguity, Diagnosis, DiagnosisVerdict, as_appearance
+from frf_ipz.diagnosis.result import NOT_DETECTABLE, Ambiguity, Diagnosis, DiagnosisVerdict, as_appearance
 from frf_ipz.diagnosis.search.component_search import fit_null_model
 from frf_ipz.diagnosis.verdict.data_checks import list_warnings, run_data_checks
 from frf_ipz.diagnosis.verdict.decision import (
@@ -87,7 +87,6 @@ DISAGREEING = "weak and strong records disagree"
 NO_TIME_BESIDE_LAW = "a linear effect beside a force law"
 NOT_WITH_STATED_DAMPING = "effects that would explain the damping"
 NOT_UNNAMED = "forces that are not in the catalogue"
-NOT_DETECTABLE = "how small an effect of each kind would show"
 SEED_WARNING = "[diagnose] seed has no effect: nothing in a diagnosis is drawn at random; leave it out"
 
 

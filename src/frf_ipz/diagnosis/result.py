@@ -125,6 +125,7 @@ class Estimate:
 NORMAL_95 = 1.96  # standard deviations
 LISTED_PROBABILITY = 0.95  # probability that the listed locations hold
 MAX_LOCATIONS = 12  # that are listed
+NOT_DETECTABLE = "how small an effect of each kind would show"
 MOST_DIGITS = 6  # of a number whose deviation is tiny
 FEWEST_DIGITS = 4  # of a number whose deviation is not known
 
@@ -677,6 +678,11 @@ class Diagnosis(Tabulated, Drawn):
     def is_complete(self) -> bool:
         """False where the time did not suffice for the whole search."""
         return not self.not_searched
+
+    @property
+    def has_seen_all(self) -> bool:
+        """False where the time did not suffice to look at every cause."""
+        return self.not_searched in {"", NOT_DETECTABLE}
 
     @property
     def is_explained(self) -> bool:

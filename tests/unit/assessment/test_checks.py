@@ -302,14 +302,14 @@ MASS = frf_ipz.Finding(effect="added_mass", probability=0.98)
     ],
 )
 def test_what_a_diagnosis_found_is_said(evidence, is_explained, findings, is_corrected, verdict, says):
-    found = SimpleNamespace(is_explained=is_explained, findings=findings, is_complete=True)
+    found = SimpleNamespace(is_explained=is_explained, findings=findings, has_seen_all=True)
     check = the(quality.diagnosis, replace(evidence, is_corrected=is_corrected, diagnosis=found))
     assert check.verdict is verdict
     assert says in check.says
 
 
 def test_a_diagnosis_that_had_no_time_does_not_say_that_nothing_explains(evidence):
-    found = SimpleNamespace(is_explained=False, findings=(), is_complete=False)
+    found = SimpleNamespace(is_explained=False, findings=(), has_seen_all=False)
     check = the(quality.diagnosis, replace(evidence, diagnosis=found))
     assert check.verdict is WITH_CARE
     assert "the time was over" in check.says

@@ -210,7 +210,7 @@ def diagnosis(evidence: Evidence) -> Iterator[Check]:
                 "not looked for: a diagnosis compares FRFs, and modes do not tell what the model leaves out",
                 "",
             )
-    elif not found.is_explained and not found.is_complete:
+    elif not found.is_explained and not found.has_seen_all:
         says = "something is missing in the model; the time was over before all that may explain it was looked at"
         verdict, advice = Verdict.WITH_CARE, "frf-ipz diagnose looks for the cause without a limit of time"
     elif not found.is_explained:
