@@ -191,11 +191,11 @@ class _Receptance:
     def newton_step(self, outputs: FloatArray, inputs: FloatArray, s: ComplexArray) -> ComplexArray:
         """Step from s (n,) to the zero, where the rows of sensors and excitations change by (n, r) arrays."""
         residues = ((self.outputs + outputs) @ self.right) * ((self.inputs + inputs) @ self.left)
-        nearness = 1 / (s[:, None] - np.concatenate([self.poles, self.poles.conj()]))
-        terms = np.hstack([residues, residues.conj()]) * nearness
-        value, slope = terms.sum(axis=1), -np.sum(terms * nearness, axis=1)
-        step: ComplexArray = np.divide(-value, slope, out=np.zeros_like(value), where=slope != 0)
-        return step
+        with np.errstate(all="ignore"):  # a zero that meets a pole has no slope; what is not finite is no step
+            nearness = 1 / (s[:, None] - np.concatenate([self.poles, self.poles.conj()]))
+            terms = np.hstack([residues, residues.conj()]) * nearness
+            step: ComplexArray = terms.sum(axis=1) / np.sum(terms * nearness, axis=1)
+        return np.where(np.isfinite(step), step, 0.0)
 
 
 def _output(label: FrfLabel) -> AnyDof:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from frf_ipz.diagnosis.position_uncertainty import propagate_position_tolerance
 from frf_ipz.updating.position_uncertainty import PositionUncertainty, with_position_uncertainty
@@ -80,6 +81,22 @@ def test_what_zeros_miss_of_the_first_order_is_their_own_noise(case):
     assert is_seen.any()
     ratio = np.sqrt(stated[is_seen] / expected[is_seen])
     assert np.all((ratio > 0.5) & (ratio < 2)), ratio
+
+
+def test_a_zero_that_meets_a_pole_has_a_finite_noise():
+    case = make_update_case(SEEDS[0])
+    problem = make_problem(case.reduced_model, case.fit, case.pairs, None)
+    off = propagate_position_tolerance(
+        case.fit, case.reduced_model, fe_model=case.structure.nominal_model, tolerance_m_per_m=TOLERANCE
+    )
+    model = replace(problem.model, damping=np.zeros_like(problem.model.damping))
+    pole = 1j * np.sqrt(eigh(model.stiffness, model.mass)[0][0])  # to the last bit, as it is computed there
+    zeros = np.flatnonzero(problem.frf >= 0)
+    still = tuple(replace(position, row=0 * position.row) for position in off)
+    computed = problem.computed.copy()
+    computed[zeros[0]] = pole
+    met = replace(problem, model=model, computed=computed)
+    assert np.isfinite(with_position_uncertainty(met, still)).all()
 
 
 def _with_all(problem, off, white):
