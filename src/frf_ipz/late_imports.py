@@ -6,8 +6,12 @@ stand, under the ``else`` of the ``TYPE_CHECKING`` under which type checkers see
 
 from __future__ import annotations
 
+import gc
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from types import ModuleType
 
 
 class _LateModule:
@@ -17,7 +21,7 @@ class _LateModule:
         self._name = name
 
     def __getattr__(self, attribute: str) -> Any:  # noqa: ANN401 - anything that a module may hold
-        return getattr(import_module(self._name), attribute)
+        return getattr(_load(self._name), attribute)
 
 
 class _LateFunction:
@@ -27,7 +31,18 @@ class _LateFunction:
         self._module, self._name = module, name
 
     def __call__(self, *args: Any, **options: Any) -> Any:  # noqa: ANN401 - those of the function
-        return getattr(import_module(self._module), self._name)(*args, **options)
+        return getattr(_load(self._module), self._name)(*args, **options)
+
+
+def _load(name: str) -> ModuleType:
+    """Import a module, and look for no garbage while it is imported: what modules make stays, and is much."""
+    is_collecting = gc.isenabled()
+    gc.disable()
+    try:
+        return import_module(name)
+    finally:
+        if is_collecting:
+            gc.enable()
 
 
 def import_late(module: str, function: str = "") -> Any:  # noqa: ANN401 - a module or a function

@@ -11,15 +11,18 @@ import zlib
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
-from scipy.io import loadmat
-
 from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.input_files import read_bytes
+from frf_ipz.late_imports import import_late
 from frf_ipz.matlab_elements import COMPRESSED, HEADER_BYTES, TAG_BYTES, DamagedError, require_elements
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from scipy.io import loadmat
+else:
+    loadmat = import_late("scipy.io", "loadmat")
 
 KIND = "a MATLAB file of version 4 to 7.2"
 LOSSES = ("corrupt", "Unreadable", "Duplicate")  # words of SciPy's warnings where a variable is not what the file means

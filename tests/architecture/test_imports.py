@@ -5,7 +5,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from small_campaign import write_campaign
+
 MODULES_AT_START = 125  # of 620 in all: those of options, files, the model, and the first stage
+NOT_AT_START = {
+    *("pandas", "pyarrow", "jinja2", "filelock", "joblib", "h5py", "pint", "rich", "matplotlib", "plotly", "control"),
+    *(f"scipy.{name}" for name in ("stats", "optimize", "signal", "interpolate", "ndimage", "fft", "spatial")),
+    *("scipy.special", "scipy.io"),
+}
 SOURCE = Path(__file__).parents[2] / "src" / "frf_ipz"
 
 
@@ -27,10 +36,50 @@ def test_importing_the_command_leaves_heavy_packages_alone():
 def test_a_chain_starts_without_what_only_later_stages_need():
     """What is imported costs more than the first stages of a small test; counted, as seconds differ by machine."""
     loaded = modules_after("import frf_ipz.cli.main, frf_ipz.pipeline.run")
-    scipys = "stats", "optimize", "signal", "interpolate", "ndimage", "fft", "spatial", "special"
-    heavy = {"pandas", "pyarrow", *(f"scipy.{name}" for name in scipys)}
-    assert not loaded & {*heavy, "jinja2", "joblib", "h5py", "frf_ipz.diagnosis.diagnose", "frf_ipz.report.page"}
+    assert not names_of(loaded) & {*NOT_AT_START, "frf_ipz.diagnosis.diagnose", "frf_ipz.report.page"}
     assert len([name for name in loaded if name.startswith("frf_ipz.")]) <= MODULES_AT_START
+
+
+@pytest.mark.parametrize("command", ["ingest", "fit", "pair", "update", "predict", "export", "run", "check"])
+def test_a_command_opens_its_file_before_it_loads_what_its_work_may_not_need(tmp_path, command):
+    file = tmp_path / "pipeline.toml"
+    file.write_text("")
+    loaded = modules_of_command([command, str(file)], until_it_opens=file)
+    assert "numpy" in loaded
+    assert not names_of(loaded) & {*NOT_AT_START, "frf_ipz.assessment.assess", "frf_ipz.diagnosis.diagnose"}
+
+
+def test_a_fit_loads_nothing_of_the_stages_after_it(tmp_path):
+    file = write_campaign(tmp_path)
+    loaded = modules_of_command(["fit", str(file), "--out", str(tmp_path / "out")])
+    assert "frf_ipz.identification.fit" in loaded
+    after = {"assessment.assess", "prediction.predict", "report.page", "updating.update", "pairing.pair"}
+    assert not names_of(loaded) & {f"frf_ipz.{name}" for name in after}
+    assert not names_of(loaded) & {"rich", "jinja2", "control", "scipy.optimize", "scipy.signal", "scipy.io"}
+
+
+def modules_of_command(arguments, *, until_it_opens=None):
+    """Names of all modules that a command has loaded at its end, or when it opens a file."""
+    code = f"""
+import atexit, os, sys
+def tell():
+    print("\\n".join(sys.modules), flush=True)
+def look(event, seen):
+    if event == "open" and seen[0] == {str(until_it_opens)!r}:
+        tell()
+        os._exit(0)
+atexit.register(tell)
+sys.addaudithook(look)
+sys.argv = ["frf-ipz", *{arguments!r}]
+from frf_ipz.cli.main import main
+main()
+"""
+    return set(subprocess.check_output([sys.executable, "-c", code], text=True).split())
+
+
+def names_of(modules):
+    """Modules with the packages that they are of."""
+    return {".".join(parts[:count]) for parts in (name.split(".") for name in modules) for count in (1, 2, 3)}
 
 
 def test_imports_stand_at_the_top():

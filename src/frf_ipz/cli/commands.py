@@ -6,13 +6,33 @@ Every stage is imported by the command that needs it, so that ``--help`` answers
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from frf_ipz import __version__
 from frf_ipz.cli.printing import say
+from frf_ipz.late_imports import import_late
 from frf_ipz.visible_text import one_line
+
+if TYPE_CHECKING:
+    from frf_ipz.cli.comparison import compare_folders
+    from frf_ipz.cli.local_page import serve_page
+    from frf_ipz.cli.pictures import draw_picture, picture_list
+    from frf_ipz.cli.terminal import run_fleet_with_progress, run_with_progress
+    from frf_ipz.pipeline.check.setup import describe_setup
+    from frf_ipz.pipeline.init.starting_files import write_starting_files
+    from frf_ipz.pipeline.inputs import read_inputs
+else:
+    compare_folders = import_late("frf_ipz.cli.comparison", "compare_folders")
+    serve_page = import_late("frf_ipz.cli.local_page", "serve_page")
+    draw_picture = import_late("frf_ipz.cli.pictures", "draw_picture")
+    picture_list = import_late("frf_ipz.cli.pictures", "picture_list")
+    run_fleet_with_progress = import_late("frf_ipz.cli.terminal", "run_fleet_with_progress")
+    run_with_progress = import_late("frf_ipz.cli.terminal", "run_with_progress")
+    describe_setup = import_late("frf_ipz.pipeline.check.setup", "describe_setup")
+    write_starting_files = import_late("frf_ipz.pipeline.init.starting_files", "write_starting_files")
+    read_inputs = import_late("frf_ipz.pipeline.inputs", "read_inputs")
 
 EPILOG = """
 [bold]From a folder of recordings to a controller-ready model[/bold]
@@ -76,8 +96,6 @@ def _stage_command(stage: str) -> None:
     """Add the command that runs the chain up to a stage."""
 
     def command(pipeline: PipelineArgument, out: OutOption = Path("results"), quiet: QuietOption = False) -> None:
-        from frf_ipz.cli.terminal import run_with_progress
-
         until, diagnosing = ("report", None) if stage == "run" else (stage, True if stage == "diagnose" else None)
         run_with_progress(pipeline, out, until=until, diagnosing=diagnosing, quiet=quiet)
 
@@ -102,8 +120,6 @@ def fleet(
     quiet: QuietOption = False,
 ) -> None:
     """Run many machines of one kind, and compare them: fleet.parquet, fleet_poles.parquet, fleet.html and others."""
-    from frf_ipz.cli.terminal import run_fleet_with_progress
-
     run_fleet_with_progress(fleet, out, jobs=jobs, scheduler=scheduler, only=only, quiet=quiet)
 
 
@@ -122,17 +138,12 @@ def compare(
     ] = None,
 ) -> None:
     """Say which modes have moved from one test of a structure to another: compare.html, compare.csv."""
-    from frf_ipz.cli.comparison import compare_folders
-
     say(compare_folders(before, after, out, frequency_scatter=frequency_scatter, damping_scatter=damping_scatter))
 
 
 @app.command()
 def check(pipeline: PipelineArgument) -> None:
     """Validate test, model and pipeline, draw the set-up, run nothing."""
-    from frf_ipz.pipeline.check.setup import describe_setup
-    from frf_ipz.pipeline.inputs import read_inputs
-
     say(describe_setup(read_inputs(pipeline)))
 
 
@@ -143,8 +154,6 @@ def init(
     ],
 ) -> None:
     """Write commented test.toml, model.toml and pipeline.toml from a folder of CSVs; what is there is left alone."""
-    from frf_ipz.pipeline.init.starting_files import write_starting_files
-
     files = write_starting_files(folder)
     for path, written in files.written.items():
         say(one_line(f"{'wrote' if written else 'left '} {path}"))
@@ -164,8 +173,6 @@ def plot(
     ] = None,
 ) -> None:
     """Draw one picture of a run for a publication."""
-    from frf_ipz.cli.pictures import draw_picture, picture_list
-
     say(picture_list(folder) if name is None else draw_picture(folder, name, file_format, out))
 
 
@@ -178,6 +185,4 @@ def show(
     ] = None,
 ) -> None:
     """Open a local page on a run or a campaign: look, run, reject and pin poles; changes go to pipeline.toml."""
-    from frf_ipz.cli.local_page import serve_page
-
     serve_page(folder, port=port, browser=browser)

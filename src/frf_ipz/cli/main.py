@@ -91,7 +91,9 @@ def _run() -> None:
     for name in THREADS:  # NumPy reads them when it is loaded, by the command; what the user has chosen stays
         os.environ.setdefault(name, "1")
     os.environ.setdefault(*NO_PLUGINS)
-    from frf_ipz.cli.commands import app
+    from frf_ipz.late_imports import import_late
+
+    app = import_late("frf_ipz.cli.commands").app  # NumPy is in it
     from frf_ipz.cli.printing import guard_streams, say_error
     from frf_ipz.errors import FrfIpzError, NumericalError
 

@@ -5,21 +5,29 @@ Both say how long it has taken and, once that can be told, how long it will take
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
 from frf_ipz.cli.printing import say_progress
+from frf_ipz.late_imports import import_late
 from frf_ipz.visible_text import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
     from frf_ipz.progress import Progress as Report
+else:
+    Console = import_late("rich.console", "Console")
+    BarColumn = import_late("rich.progress", "BarColumn")
+    Progress = import_late("rich.progress", "Progress")
+    TextColumn = import_late("rich.progress", "TextColumn")
+    TimeElapsedColumn = import_late("rich.progress", "TimeElapsedColumn")
 
 REFRESHES_A_SECOND = 2.0
 LINE_EVERY_S = 60.0
@@ -95,20 +103,20 @@ def showing_progress(*, quiet: bool) -> Iterator[Report]:
     Progress
         To hand to the command.
     """
-    console = Console(stderr=True, quiet=quiet, highlight=False)
     estimate = Estimate()
-    with _bar(console, estimate) if console.is_terminal and not quiet else _lines(estimate, quiet=quiet) as show:
+    with _bar(estimate) if sys.stderr.isatty() and not quiet else _lines(estimate, quiet=quiet) as show:
         yield show
 
 
 @contextmanager
-def _bar(console: Console, estimate: Estimate) -> Iterator[Report]:
+def _bar(estimate: Estimate) -> Iterator[Report]:
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=24),
         TimeElapsedColumn(),
         TextColumn("{task.fields[remaining]}", markup=False),
     )
+    console = Console(stderr=True, highlight=False)
     with Progress(*columns, console=console, transient=True, refresh_per_second=REFRESHES_A_SECOND) as bar:
         task = bar.add_task("reading", total=1.0, remaining="")
 

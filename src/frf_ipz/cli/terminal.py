@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from frf_ipz.cli.printing import say
 from frf_ipz.cli.progress_display import showing_progress
+from frf_ipz.late_imports import import_late
 from frf_ipz.pipeline.run import run_pipeline
+
+if TYPE_CHECKING:
+    from frf_ipz.fleet.run import run_fleet
+else:
+    run_fleet = import_late("frf_ipz.fleet.run", "run_fleet")
 
 
 def run_with_progress(pipeline: Path, out: Path, *, until: str, diagnosing: bool | None, quiet: bool) -> None:
@@ -61,8 +68,6 @@ def run_fleet_with_progress(
     FrfIpzError
         If the fleet cannot be run.
     """
-    from frf_ipz.fleet.run import run_fleet
-
     machines = [name.strip() for name in only.split(",") if name.strip()]
     with showing_progress(quiet=quiet) as show:
         results = run_fleet(fleet, out, jobs=jobs, scheduler=scheduler, only=machines, progress=show)

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.io import savemat
 
 from frf_ipz.arguments import require_file
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.export.state_space import ARRAYS, NAMES, StateSpaceModel, from_control, matrix_shapes, to_control
 from frf_ipz.export.uncertainty import UncertaintyWeights
 from frf_ipz.json_files import read_json
+from frf_ipz.late_imports import import_late
 from frf_ipz.matlab_files import read_matlab
 from frf_ipz.output_files import replacing, write_text
 
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     import control
+    from scipy.io import savemat
+else:
+    savemat = import_late("scipy.io", "savemat")
 
 
 SUFFIXES = (".json", ".mat")

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize
 
 from frf_ipz.arguments import require_type
 from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
@@ -21,6 +20,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.export.options import ExportOptions
 from frf_ipz.export.ports import choose_ports
 from frf_ipz.frf import FrfLabel, require_measured
+from frf_ipz.late_imports import import_late
 from frf_ipz.prediction.ensemble import ModelEnsemble
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
@@ -29,9 +29,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import control
+    from scipy.optimize import minimize
 
     from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import Measured
+else:
+    minimize = import_late("scipy.optimize", "minimize")
 
 WEIGHT_LINES = 400  # of the band, at equal ratios, on which the error of an output is bounded
 WIDEST = 1e4  # ratio of the ends of the band on which it is, where the band begins at 0

@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from filelock import FileLock
-
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.model_file import model_files, read_model
 from frf_ipz.input_files import Ledger, digest_file, entering
+from frf_ipz.late_imports import import_late
 from frf_ipz.output_files import cannot_write
 from frf_ipz.runs.codec import load_result, save_result
 from frf_ipz.runs.stage_file import SUFFIX
@@ -22,7 +21,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
+    from filelock import FileLock
+
     from frf_ipz.structure import ReducedModel, StructuralModel
+else:
+    FileLock = import_late("filelock", "FileLock")
 
 STAGE = "reduce"
 

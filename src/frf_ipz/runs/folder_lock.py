@@ -12,16 +12,21 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from filelock import FileLock, Timeout
-
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.json_files import read_json
+from frf_ipz.late_imports import import_late
 from frf_ipz.output_files import to_its_end, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    import filelock
+    from filelock import FileLock
+
     from frf_ipz.progress import Progress
+else:
+    filelock = import_late("filelock")
+    FileLock = import_late("filelock", "FileLock")
 
 LOCK, HOLDER = "lock", "holder.json"
 WAIT_S = 10.0  # so long the second command waits
@@ -77,7 +82,7 @@ def _acquire(lock: FileLock, path: Path, hidden: Path, progress: Progress) -> No
         hidden.mkdir(parents=True, exist_ok=True)
         try:
             lock.acquire(blocking=False)
-        except Timeout:
+        except filelock.Timeout:
             remaining = end - time.monotonic()
             if remaining <= 0:
                 raise InputError(

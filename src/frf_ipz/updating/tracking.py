@@ -7,12 +7,13 @@ does not keep the greater part of its vectors, or two end at one root, all zeros
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NumericalError
+from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.pencils import Roots, damped_poles, damped_zeros, undamped_poles
 from frf_ipz.numerics.pole_forms import (
     DampedModel,
@@ -22,6 +23,11 @@ from frf_ipz.numerics.pole_forms import (
     every_undamped_zero,
     undamped_form,
 )
+
+if TYPE_CHECKING:
+    from scipy.optimize import linear_sum_assignment
+else:
+    linear_sum_assignment = import_late("scipy.optimize", "linear_sum_assignment")
 
 SAME_ROOT = 0.5  # overlap of its vectors with those before, above which no other root can be more alike
 APART = 1e-9  # relative distance below which two zeros of an FRF are one

@@ -12,20 +12,24 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.identification.results.shapes import product_factors
+from frf_ipz.late_imports import import_late
 from frf_ipz.rational import natural_frequency_hz
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from scipy.optimize import linear_sum_assignment
 
     from frf_ipz.dofs import AnyDof
     from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.identification.peaks import FrfPeaks
     from frf_ipz.modes import ModeSet
+else:
+    linear_sum_assignment = import_late("scipy.optimize", "linear_sum_assignment")
 
 # How far a model is off that is nearly right: what lies beyond is worth a cause.
 FREQUENCY_SCALE = 0.03  # of a frequency, relative: 6 % of a stiffness, the scatter of moduli and thicknesses

@@ -9,15 +9,19 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from frf_ipz.assessment.assessment import Check, Verdict
 from frf_ipz.assessment.deviations import worst_median
 from frf_ipz.control_margins import GAIN_MARGIN_DB, HALF, PHASE_MARGIN_DEG, SIXTH
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
+    from scipy.optimize import minimize_scalar
+
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
     from frf_ipz.assessment.evidence import Evidence
+else:
+    minimize_scalar = import_late("scipy.optimize", "minimize_scalar")
 
 NORMAL_90 = 1.645  # standard deviations that hold 90 % of a normal distribution
 OVERSAMPLED = 4  # points of a transform between two that are independent: one of them is near its peak

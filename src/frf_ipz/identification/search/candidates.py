@@ -10,12 +10,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft, special
+from scipy import special
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.late_imports import import_late
+
+if TYPE_CHECKING:
+    from scipy import fft
+else:
+    fft = import_late("scipy.fft")
 
 FALSE_ALARMS = 1e-3  # candidates that pure noise would give, per search
 NARROWEST, WIDENING = 0.4, 5.0  # half widths tried: the first in lines, and the factor to the next: 0.85 match at worst

@@ -12,17 +12,21 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.identification.likelihood.compression import CompressedSystem, column_gains, response
 from frf_ipz.identification.measured_lines import WeightedLines
 from frf_ipz.identification.noise import smooth_level
 from frf_ipz.identification.search.candidates import Candidates, find_candidates
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
+    from scipy.optimize import linear_sum_assignment
+
     from frf_ipz.identification.likelihood.refinement import RefinedPoles
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
+else:
+    linear_sum_assignment = import_late("scipy.optimize", "linear_sum_assignment")
 
 LEVEL_SCATTER = 1.6  # a level found from one block of lines exceeds its expectation by this about once in a thousand
 FAR = 10.0  # mean square of the misfit over that of noise, above which modes are missing

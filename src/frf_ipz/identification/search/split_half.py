@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NoModesError
@@ -25,11 +25,16 @@ from frf_ipz.identification.likelihood.refinement import refine_poles
 from frf_ipz.identification.measured_lines import FEWEST_LINES
 from frf_ipz.identification.search.find_modes import FittedModes, find_modes, variance_factors
 from frf_ipz.identification.search.spurious_poles import DEMANDED, half_widths_apart
+from frf_ipz.late_imports import import_late
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
+    from scipy import optimize
+
     from frf_ipz.frf import FrfSet
     from frf_ipz.identification.options import FitOptions
+else:
+    optimize = import_late("scipy.optimize")
 
 HALVES = 2
 SAME_POLE = 0.5  # half widths of the narrower of two poles within which they are one mode

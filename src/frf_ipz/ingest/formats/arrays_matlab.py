@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import lazy_loader
 import numpy as np
 from scipy import sparse
-from scipy.io.matlab import MatlabFunction, MatlabOpaque
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader
@@ -21,12 +20,17 @@ from frf_ipz.hdf5_files import SIGNATURE, Hdf5Tree, open_tree
 from frf_ipz.ingest.formats.file_arrays import MOST_EXPANDED, ArrayFormat, FileArrays
 from frf_ipz.ingest.formats.text_layout import read_head
 from frf_ipz.input_files import require_regular_file
+from frf_ipz.late_imports import import_late
 from frf_ipz.matlab_files import read_matlab
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from scipy.io import matlab
+
     from frf_ipz.ingest.formats.file_arrays import NumericArray
+else:
+    matlab = import_late("scipy.io.matlab")
 
 h5py = lazy_loader.load("h5py")  # slow to load, and most recordings do not need it
 
@@ -93,7 +97,7 @@ class _Found:
         """Take a value as SciPy gives it."""
         if len(self.arrays) + len(self.texts) > MOST_ITEMS or sparse.issparse(value):
             self.unread.append(name)
-        elif not isinstance(value, np.ndarray) or isinstance(value, (MatlabFunction, MatlabOpaque)):
+        elif not isinstance(value, np.ndarray) or isinstance(value, (matlab.MatlabFunction, matlab.MatlabOpaque)):
             self.unread.append(name)
             self.has_objects = True
         elif value.dtype.names:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pyarrow as pa
 
 from frf_ipz.arrays import complex_array
 from frf_ipz.dofs import AnyDof, parse_label
@@ -13,9 +12,14 @@ from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import TextLayout, sniff
 from frf_ipz.ingest.formats.text_table import column_index, not_a_number, read_blocks, require_once
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
+    import pyarrow as pa
+
     from frf_ipz.arrays import FloatArray
+else:
+    pa = import_late("pyarrow")
 
 NUMBERS = ("frequency_hz", "real", "imag")
 LABELS = ("output_dof", "input_dof")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pyarrow as pa
 
 from frf_ipz.arrays import ComplexArray, FloatArray, complex_array
 from frf_ipz.errors import FileFormatError, did_you_mean
@@ -13,6 +13,12 @@ from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf,
 from frf_ipz.ingest.formats.text_layout import COMMENT, NEWLINE, TextLayout, decode, name_and_unit, open_text, sniff
 from frf_ipz.ingest.formats.text_table import not_a_number, read_blocks, require_once
 from frf_ipz.ingest.units import frequency_factor, is_frequency_unit
+from frf_ipz.late_imports import import_late
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+else:
+    pa = import_late("pyarrow")
 
 SKIP = "skip"
 ANGULAR = re.compile(r"w|omega\w*|om|rad_?s|w_?(vec|axis)\w*", re.IGNORECASE)  # names of angular frequencies

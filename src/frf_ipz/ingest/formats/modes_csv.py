@@ -5,22 +5,26 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pyarrow as pa
 
 from frf_ipz.dofs import parse_dof
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.ingest.formats.modes_file import ModesSource, make_modes
 from frf_ipz.ingest.formats.text_layout import sniff
 from frf_ipz.ingest.formats.text_table import column_index, line_of_row, read_blocks
+from frf_ipz.late_imports import import_late
 from frf_ipz.modes import DEVIATIONS
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import pyarrow as pa
+
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.dofs import Dof
     from frf_ipz.ingest.formats.text_layout import TextLayout
     from frf_ipz.modes import ModalParameters
+else:
+    pa = import_late("pyarrow")
 
 OF_MODE = ("frequency_hz", "damping_ratio")
 NEEDED = ("mode", *OF_MODE, "dof", "real")

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pyarrow as pa
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats.recording import LARGEST, RawRecording, RecordingContents, SignalColumn
@@ -16,15 +15,20 @@ from frf_ipz.ingest.formats.text_columns import TIME, find_columns, no_time, sec
 from frf_ipz.ingest.formats.text_layout import is_number, name_and_unit, sniff
 from frf_ipz.ingest.formats.text_table import column_index, line_of_row, not_a_number, read_blocks
 from frf_ipz.ingest.units import unit_factor
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
+    import pyarrow as pa
+
     from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.formats.recording import TableKeys
     from frf_ipz.ingest.formats.text_columns import TextColumns
     from frf_ipz.ingest.formats.text_layout import TextLayout
+else:
+    pa = import_late("pyarrow")
 
 SAME_RATE = 0.01  # the contract's limit for a step that differs
 

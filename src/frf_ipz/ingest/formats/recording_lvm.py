@@ -11,20 +11,25 @@ from typing import TYPE_CHECKING, Any
 
 import lazy_loader
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv as arrow_csv
 
 from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.ingest.formats.signal_table import SAME_RATE, Signal, SignalFormat, SignalTable, even_times
 from frf_ipz.ingest.formats.text_layout import decode, name_and_unit
 from frf_ipz.input_files import read_bytes
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    import pyarrow as pa
+    import pyarrow.csv as arrow_csv
+
     from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.formats.recording import TableKeys
+else:
+    pa = import_late("pyarrow")
+    arrow_csv = import_late("pyarrow.csv")
 
 lvm_read = lazy_loader.load("lvm_read")
 

@@ -6,16 +6,20 @@ import io
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.io import wavfile
 
 from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.ingest.formats.signal_table import Signal, SignalFormat, SignalTable, even_times
 from frf_ipz.input_files import read_bytes
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from scipy.io import wavfile
+
     from frf_ipz.ingest.formats.recording import TableKeys
+else:
+    wavfile = import_late("scipy.io.wavfile")
 
 KIND = "a WAV file"
 LOSSES = ("Reached EOF",)  # of the messages of SciPy: samples that are not there

@@ -9,19 +9,24 @@ from itertools import islice
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv as arrow_csv
 
 from frf_ipz.errors import FileFormatError, did_you_mean
 from frf_ipz.ingest.formats.text_layout import NEWLINE, decode, is_number, name_and_unit, open_text
+from frf_ipz.late_imports import import_late
 from frf_ipz.text_numbers import NumberError, parse_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
+    import pyarrow as pa
+    import pyarrow.csv as arrow_csv
+
     from frf_ipz.arrays import FloatArray, IntArray
     from frf_ipz.ingest.formats.text_layout import TextLayout
+else:
+    pa = import_late("pyarrow")
+    arrow_csv = import_late("pyarrow.csv")
 
 BLOCK_BYTES = 1 << 22
 LINES_AT_ONCE = 10_000

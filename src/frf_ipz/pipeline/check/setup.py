@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from frf_ipz.ingest.recording_files import RecordingFiles
-from frf_ipz.pipeline.check.comparison import compare_with_model
+from frf_ipz.late_imports import import_late
 from frf_ipz.pipeline.check.look import Look
 from frf_ipz.pipeline.check.measurement import look_at_measurement, open_recordings
 from frf_ipz.pipeline.check.model import look_at_model
@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from frf_ipz.dofs import AnyDof
+    from frf_ipz.pipeline.check.comparison import compare_with_model
     from frf_ipz.pipeline.inputs import PipelineInputs
+else:
+    compare_with_model = import_late("frf_ipz.pipeline.check.comparison", "compare_with_model")
 
 FITS = "Everything fits together. Nothing was run."
 MARKS_ARE_OPEN = "Lines that 'init' had to guess; correct each, and take CHECK away where it is right:"

@@ -6,16 +6,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
-from frf_ipz.assessment.assess import likely_cause
-from frf_ipz.assessment.causes.columns import find_exchanged_columns
 from frf_ipz.errors import FrfIpzError, InputError, NoModesError, NumericalError
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
+    from frf_ipz.assessment.assess import likely_cause
     from frf_ipz.assessment.assessment import LikelyCause
+    from frf_ipz.assessment.causes.columns import find_exchanged_columns
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.structure import StructuralModel
+else:
+    likely_cause = import_late("frf_ipz.assessment.assess", "likely_cause")
+    find_exchanged_columns = import_late("frf_ipz.assessment.causes.columns", "find_exchanged_columns")
 
 
 @contextmanager

@@ -8,42 +8,57 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.assessment.assess import assess as judge_run
-from frf_ipz.assessment.evidence import Evidence
-from frf_ipz.diagnosis.apply import correct_model
 from frf_ipz.errors import InputError
 from frf_ipz.export import run_tables as tables
-from frf_ipz.export.modal_files import write_frfs, write_modes
 from frf_ipz.export.parquet import write_table
-from frf_ipz.export.state_space import make_state_space, make_state_space_ensemble
-from frf_ipz.export.state_space_files import write_ensemble, write_state_space, write_uncertainty_weights
-from frf_ipz.export.uncertainty import estimate_uncertainty_weights
 from frf_ipz.frf import FrfSet
+from frf_ipz.late_imports import import_late
 from frf_ipz.pipeline.stages.delays import known_delays
 from frf_ipz.pipeline.stages.mismatch import effects_of
-from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.rational import without_window
-from frf_ipz.report.page import write_report
 from frf_ipz.runs.digests import digest_arrays
 from frf_ipz.runs.results import Results
-from frf_ipz.updating.updated_model import UpdateStatus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from frf_ipz.assessment.assess import assess as judge_run
     from frf_ipz.assessment.assessment import Assessment
+    from frf_ipz.assessment.evidence import Evidence
+    from frf_ipz.diagnosis.apply import correct_model
     from frf_ipz.diagnosis.result import Diagnosis
     from frf_ipz.dofs import AnyDof
+    from frf_ipz.export.modal_files import write_frfs, write_modes
     from frf_ipz.export.options import ExportOptions
-    from frf_ipz.export.state_space import StateSpaceModel
+    from frf_ipz.export.state_space import StateSpaceModel, make_state_space, make_state_space_ensemble
+    from frf_ipz.export.state_space_files import write_ensemble, write_state_space, write_uncertainty_weights
+    from frf_ipz.export.uncertainty import estimate_uncertainty_weights
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pairing.pairs import Pairs
     from frf_ipz.pipeline.stage_runner import StageRunner
+    from frf_ipz.prediction.predict import predict_frfs
     from frf_ipz.prediction.prediction import Prediction
+    from frf_ipz.report.page import write_report
     from frf_ipz.runs.folder import Writers
     from frf_ipz.structure import Geometry, StructuralModel
+    from frf_ipz.updating import updated_model
     from frf_ipz.updating.updated_model import UpdatedModel
+else:
+    judge_run = import_late("frf_ipz.assessment.assess", "assess")
+    Evidence = import_late("frf_ipz.assessment.evidence", "Evidence")
+    correct_model = import_late("frf_ipz.diagnosis.apply", "correct_model")
+    write_frfs = import_late("frf_ipz.export.modal_files", "write_frfs")
+    write_modes = import_late("frf_ipz.export.modal_files", "write_modes")
+    make_state_space = import_late("frf_ipz.export.state_space", "make_state_space")
+    make_state_space_ensemble = import_late("frf_ipz.export.state_space", "make_state_space_ensemble")
+    write_ensemble = import_late("frf_ipz.export.state_space_files", "write_ensemble")
+    write_state_space = import_late("frf_ipz.export.state_space_files", "write_state_space")
+    write_uncertainty_weights = import_late("frf_ipz.export.state_space_files", "write_uncertainty_weights")
+    estimate_uncertainty_weights = import_late("frf_ipz.export.uncertainty", "estimate_uncertainty_weights")
+    predict_frfs = import_late("frf_ipz.prediction.predict", "predict_frfs")
+    updated_model = import_late("frf_ipz.updating.updated_model")
+    write_report = import_late("frf_ipz.report.page", "write_report")
 
 WEIGHT_LINES = 400  # of the band, at equal ratios, on which the uncertainty of an output is bounded
 
@@ -192,7 +207,7 @@ def export(
     inputs = runner.inputs
     options = inputs.options.export
     delays = known_delays(modal_fit, corrected_by)
-    has_members = options.ensemble and updated.status is not UpdateStatus.NOTHING_TO_DO
+    has_members = options.ensemble and updated.status is not updated_model.UpdateStatus.NOTHING_TO_DO
     return runner.stage(
         "export",
         {"options": asdict(options), "points": repr(inputs.points), "after": runner.after("update"), "delays": delays},

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.late_imports import import_late
@@ -19,11 +18,13 @@ from frf_ipz.updating.updated_model import UpdateStatus
 
 if TYPE_CHECKING:
     import pandas as pd
+    from scipy.optimize import linear_sum_assignment
 
     from frf_ipz.updating.parameters import ParameterBasis
     from frf_ipz.updating.problem import UpdateProblem
 else:
     pd = import_late("pandas")
+    linear_sum_assignment = import_late("scipy.optimize", "linear_sum_assignment")
 
 INSENSITIVE = 1e-12  # of the largest sensitivity: a parameter below moves no target
 

@@ -16,14 +16,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from scipy.linalg import lapack
-from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import NumericalError
+from frf_ipz.late_imports import import_late
+
+if TYPE_CHECKING:
+    from scipy.optimize import linear_sum_assignment
+else:
+    linear_sum_assignment = import_late("scipy.optimize", "linear_sum_assignment")
 
 DOMINANT = 5.0  # imaginary over real part of a root that a measurement shows as a resonance or antiresonance
 ILL_CONDITIONED = 1e5  # condition number of S^H W S from which alpha is used (step 2g)

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from frf_ipz.arrays import FloatArray
+from frf_ipz.late_imports import import_late
 from frf_ipz.updating.gaussian import draw_posterior
 from frf_ipz.updating.minimal_change.damping import DampingPhase
 from frf_ipz.updating.minimal_change.gauss_newton import Phase, PhaseResult
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, is_negative
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase
 from frf_ipz.updating.parameters import unwhiten
+
+if TYPE_CHECKING:
+    from scipy.optimize import linear_sum_assignment
+else:
+    linear_sum_assignment = import_late("scipy.optimize", "linear_sum_assignment")
 
 MOST_HALVINGS = 53  # bits of a number: what is as far as that from the mean is the mean
 

@@ -13,18 +13,22 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import optimize
 
 from frf_ipz.dofs import TRANSLATIONS, AnyDof, Dof
+from frf_ipz.late_imports import import_late
 from frf_ipz.updating.expansion import AttachedMass
 from frf_ipz.updating.shape_expansion.random_forces import ModalModel, expand_shape
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from scipy import optimize
+
     from frf_ipz.arrays import FloatArray
     from frf_ipz.structure import Geometry, ReducedModel
     from frf_ipz.updating.shape_expansion.measured_shapes import MeasuredShapes
+else:
+    optimize = import_late("scipy.optimize")
 
 STIFFNESS_STD = 0.05  # of the logarithm: 3 % of a modulus over density, and 2 % of a thickness, which counts twice
 SHARE_STD = 0.3  # of the mass that a mode has at the place: what is attached is the smaller part

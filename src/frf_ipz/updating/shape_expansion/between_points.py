@@ -10,15 +10,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import nnls
 
 from frf_ipz.dofs import AnyDof, Dof
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from scipy.optimize import nnls
+
     from frf_ipz.arrays import BoolArray, FloatArray
     from frf_ipz.structure import Geometry
+else:
+    nnls = import_late("scipy.optimize", "nnls")
 
 ROUNDING = 1e-6  # of the extent of the measured points: printed coordinates
 

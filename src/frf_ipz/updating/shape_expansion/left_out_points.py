@@ -7,9 +7,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq
 
 from frf_ipz.arrays import BoolArray, FloatArray
+from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.noise_floor import above_noise
 from frf_ipz.pairing.poles import measured_amplitudes
 from frf_ipz.updating.shape_expansion.expanded_model import expand_modes, receptance
@@ -18,12 +18,16 @@ from frf_ipz.updating.shape_expansion.measured_shapes import gains_of_frfs, meas
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from scipy.optimize import brentq
+
     from frf_ipz.arrays import ComplexArray
     from frf_ipz.dofs import AnyDof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.structure import ReducedModel
     from frf_ipz.updating.shape_expansion.wrong_gains import WrongGain
     from frf_ipz.updating.updated_model import UpdatedModel
+else:
+    brentq = import_late("scipy.optimize", "brentq")
 
 LINES = 300  # of the band, at equal ratios
 FEWEST = 3  # points of a side: of two, one alone would tell the other's shape

@@ -15,19 +15,24 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
-from scipy import io, sparse
+from scipy import sparse
 
 from frf_ipz.arrays import ComplexArray, IntArray
 from frf_ipz.errors import FileFormatError, did_you_mean
 from frf_ipz.fe.matrices.stored import MatrixFormat, MatrixRequest, StoredMatrix
 from frf_ipz.input_files import MISSING, read_bytes
+from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.definiteness import SYMMETRY_TOLERANCE
 from frf_ipz.text_numbers import NumberError, parse_number
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from scipy import io
+
     from frf_ipz.arrays import FloatArray, Matrix
+else:
+    io = import_late("scipy.io")
 
 LARGEST = 1e100  # in no unit does a structure have such an entry; products of larger ones overflow
 WORDS = (
