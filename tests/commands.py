@@ -32,12 +32,20 @@ LOADED = (
     "frf_ipz.pipeline.stages.hints",
     "frf_ipz.pipeline.stages.modelling",
     "frf_ipz.pipeline.stages.outputs",
+    "frf_ipz.hdf5_files",
+    "frf_ipz.universal_sets",
+    "h5py",
+    "lvm_read",
     "pandas",
     "pyarrow.compute",
+    "pyarrow.csv",
+    "pyarrow.pandas_compat",
     "pyarrow.parquet",
+    "pydantic.dataclasses",
     "scipy.ndimage",
     "scipy.optimize",
     "small_results",
+    "typer._adapters",
 )
 PAUSE_S = 0.01
 LONGEST_S = 120.0  # a command takes seconds

@@ -12,6 +12,11 @@ def open_page(browser, path):
     return browser
 
 
+def open_once(browser, path):
+    """The page as other tests have left it, who put everything back; opened where another one is."""
+    return browser if browser.current_url == path.as_uri() else open_page(browser, path)
+
+
 def wait_for(browser, script):
     """Wait until a script gives something true."""
     until = time.monotonic() + PATIENCE_S

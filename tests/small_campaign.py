@@ -61,6 +61,10 @@ run = "never"
 [predict]
 points = ["11:+z"]
 """
+QUICK = (
+    ("[diagnose]\n", '[diagnose]\neffects = ["global_stiffness"]\n'),
+    ("[predict]\n", "[update]\nensemble = 10\n[predict]\n"),
+)
 
 
 def roots():
@@ -114,3 +118,13 @@ def write_campaign(folder, *, records=3, seed=1):
     for name, text in (("test", TEST), ("model", MODEL), ("pipeline", PIPELINE)):
         (folder / f"{name}.toml").write_text(text)
     return folder / "pipeline.toml"
+
+
+def write_quick_campaign(folder):
+    """The same for tests of what becomes of the files, whatever their numbers: one cause, and a small ensemble."""
+    pipeline = write_campaign(folder)
+    text = pipeline.read_text()
+    for old, new in QUICK:
+        text = text.replace(old, new)
+    pipeline.write_text(text)
+    return pipeline

@@ -41,6 +41,13 @@ def nothing_of_other_tests(browser):
     browser.get_log("browser")
 
 
+@pytest.fixture
+def left_changed(browser):
+    """For tests that do not put everything back: the next one opens the page anew."""
+    yield
+    browser.get("about:blank")
+
+
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
     return copy_demo(made_demo(tmp_path_factory), tmp_path_factory.mktemp("served"))

@@ -4,7 +4,7 @@ import pytest
 
 from frf_ipz.report.page import write_report
 from frf_ipz.runs.results import Results
-from opened_page import errors, open_page, wait_for
+from opened_page import errors, open_once, open_page, wait_for
 from synthetic_run import synthetic_folder
 
 pytestmark = pytest.mark.browser
@@ -75,7 +75,7 @@ def screen(browser):
 
 @pytest.fixture
 def page(screen, written):
-    return open_page(screen, written)
+    return open_once(screen, written)
 
 
 def resize(page, width, height=900):
@@ -110,6 +110,8 @@ def test_the_frf_that_is_chosen_is_laid_over_its_models(page):
     page.find_element("id", "theme").click()  # draws all anew
     assert page.execute_script(shown)[1] == after
     page.find_element("id", "theme").click()
+    first.click()
+    assert page.execute_script(shown)[1] == before
     assert errors(page) == []
 
 
@@ -127,8 +129,10 @@ def test_ticks_of_frequency_axes_are_whole_numbers_and_few(page, zoom):
         assert numbers == sorted(set(numbers))
         if zoom == (12.0, 900.0):
             assert numbers == [20, 50, 100, 200, 500]
+    page.find_element("css selector", "#frf .plot").send_keys("0")
 
 
+@pytest.mark.usefixtures("left_changed")
 @pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_nothing_is_wider_than_a_narrow_screen(screen, written, theme):
     resize(screen, 390)
@@ -139,6 +143,7 @@ def test_nothing_is_wider_than_a_narrow_screen(screen, written, theme):
     assert page.execute_script(OUTSIDE) == []
 
 
+@pytest.mark.usefixtures("left_changed")
 @pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_all_that_is_written_stands_out_from_what_is_behind_it(screen, written, theme):
     prefer(screen, theme)
@@ -158,6 +163,7 @@ def test_printed_pages_bear_the_name_of_the_run_and_their_number(page):
     assert "counter(pages)" in margins
 
 
+@pytest.mark.usefixtures("left_changed")
 def test_the_summary_fills_the_first_two_printed_pages(page):
     resize(page, *PAPER_PX)
     page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
@@ -180,6 +186,7 @@ def test_the_summary_fills_the_first_two_printed_pages(page):
     assert set(cuts) == {"avoid"}
 
 
+@pytest.mark.usefixtures("left_changed")
 def test_a_browser_that_cannot_unpack_the_library_says_so_and_shows_the_tables(browser, written):
     old = browser.execute_cdp_cmd(
         "Page.addScriptToEvaluateOnNewDocument", {"source": "delete window.DecompressionStream;"}
@@ -192,6 +199,7 @@ def test_a_browser_that_cannot_unpack_the_library_says_so_and_shows_the_tables(b
         browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", {"identifier": old["identifier"]})
 
 
+@pytest.mark.usefixtures("left_changed")
 def test_the_structure_moves_turns_and_rests(page):
     image = "return document.querySelector('#shape canvas').toDataURL()"
     page.execute_script("document.querySelector('#shape').scrollIntoView()")

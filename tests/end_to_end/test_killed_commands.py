@@ -16,13 +16,12 @@ import pytest
 
 import commands
 from looking import look
-from small_campaign import write_campaign
+from small_campaign import write_quick_campaign
 from whole_results import content, faults_after_a_command, faults_of_reading, results_of
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are copied, and killed by a signal")
 
 VERBS = ("run", "diagnose", "export", "first run")
-QUICK_SEARCH = '[diagnose]\neffects = ["global_stiffness"]\n'
 N_MOMENTS = 4  # of the changes of each verb, in the fast tests
 N_TRIALS = int(os.environ.get("TRIALS", "1"))  # a long proof asks for 10: every change, and 100 moments at random
 OTHER_BAND = "580.0"
@@ -68,8 +67,7 @@ def cases(tmp_path_factory):
 
 
 def _make_case(folder, verb):
-    pipeline = write_campaign(folder)
-    pipeline.write_text(pipeline.read_text().replace("[diagnose]\n", QUICK_SEARCH))
+    pipeline = write_quick_campaign(folder)
     log = folder / "log"
     if verb != "first run":
         assert commands.run("run", pipeline, "--out", folder / "old", log=log)[0] == 0
@@ -82,10 +80,11 @@ def _make_case(folder, verb):
     assert command.wait() == 0, command.said
     n_changes, new = command.counter.value, results_of(folder / "new")
     assert commands.run("run", pipeline, "--out", folder / "clean", log=log)[0] == 0
-    for made in (verb.split()[-1], "run"):
-        assert commands.run(made, pipeline, "--out", folder / "after", log=log)[0] == 0
-    cleans = results_of(folder / "clean"), results_of(folder / "after")
-    return replace(case, n_changes=n_changes, new=new, clean=cleans[0], clean_after=cleans[1])
+    clean = results_of(folder / "clean")
+    after, verbs = ("after", (verb, "run")) if "run" not in verb else ("clean", ("run",))  # there it has run already
+    for made in verbs:
+        assert commands.run(made, pipeline, "--out", folder / after, log=log)[0] == 0
+    return replace(case, n_changes=n_changes, new=new, clean=clean, clean_after=results_of(folder / after))
 
 
 def judge(case, out):

@@ -13,7 +13,7 @@ from contextlib import suppress
 import pytest
 
 import commands
-from small_campaign import write_campaign
+from small_campaign import write_quick_campaign
 from whole_results import faults_after_a_command, faults_of_reading, results_of
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are copied, and stopped by signals")
@@ -23,7 +23,6 @@ READERS = ("plot", "show")
 N_TRIALS = int(os.environ.get("TRIALS", "1"))  # of each pair; a long proof asks for 10
 PAIRS = tuple(itertools.combinations_with_replacement((*WRITERS, *READERS), 2))[:: 1 if N_TRIALS > 1 else 3]
 SOME_PAIRS = (("run", "diagnose"), ("export", "show"), ("fit", "plot"))
-QUICK_SEARCH = '[diagnose]\neffects = ["global_stiffness"]\n'
 N_CHANGES = 250  # of a command that writes everything; the other one begins, or it is stopped, after some of them
 STOPPED = 128 + signal.SIGINT
 
@@ -33,7 +32,7 @@ class Campaign:
 
     def __init__(self, folder):
         self.folder, self.out, self.old = folder, folder / "out", folder / "old"
-        text = write_campaign(folder).read_text().replace("[diagnose]\n", QUICK_SEARCH)
+        text = write_quick_campaign(folder).read_text()
         self.pipelines = []
         for name, high in (("a", 600.0), ("b", 580.0), ("c", 590.0)):
             self.pipelines.append(folder / f"{name}.toml")
