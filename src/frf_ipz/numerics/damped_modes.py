@@ -16,6 +16,7 @@ STEPS = 80  # of the iteration: of the few modes that take so many, the work is 
 FEW = 16  # modes, up to which the eigenvalue problem costs less
 ROUNDING = 64 * np.finfo(float).eps  # relative step from which a mode counts as found
 UNDAMPED = 1e-9  # of the largest rate: below it damping leaves a mode alone, as it does rigid-body modes
+SOFT = 1e-3  # of the lowest frequency of interest, to rigid-body modes: their double poles at 0 have no residues
 COUPLED = 1e-9  # relative coupling of two modes that were found: they are not orthogonal, so one was found twice
 
 
@@ -52,6 +53,50 @@ def damped_modes(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, 
         np.concatenate([unit[:, alone], unit[:, others] @ vectors], axis=1),
         np.concatenate([unit[:, alone] / (2 * own), unit[:, others] @ left_vectors], axis=1),
     )
+
+
+def softly_held(squares: FloatArray, lowest_rad_s: float) -> FloatArray:
+    """Give rigid-body modes a frequency far below those of interest, so that their poles have residues.
+
+    Parameters
+    ----------
+    squares : (..., n) array
+        Squared natural frequencies without damping, (rad/s)^2.
+    lowest_rad_s : float
+        Lowest frequency of interest.
+
+    Returns
+    -------
+    (..., n) array
+        The same, but for those of rigid-body modes.
+    """
+    return np.maximum(squares, (SOFT * lowest_rad_s) ** 2)
+
+
+def receptance_roots(
+    squares: FloatArray, shapes: FloatArray, damping: FloatArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Poles of a model, and the vectors whose products are the residues of its receptance.
+
+    Parameters
+    ----------
+    squares : (n,) array
+        Squared natural frequencies without damping, above 0, (rad/s)^2.
+    shapes : (r, n) array
+        Mass-normalised shapes.
+    damping : (r, r) array
+        Symmetric, N s/m.
+
+    Returns
+    -------
+    poles : (k,) array
+        Without conjugates, rad/s.
+    right, left : (r, k) array
+        Those of real poles are halved, so that each sum with its conjugate is whole.
+    """
+    rates = shapes.T @ damping @ shapes
+    poles, right, left = damped_modes(squares, (rates + rates.T) / 2)
+    return poles, shapes @ right, shapes @ left * np.where(poles.imag > 0, 1.0, 0.5)
 
 
 def _of_damped(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

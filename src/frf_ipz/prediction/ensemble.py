@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.numerics.damped_modes import damped_modes
+from frf_ipz.numerics.damped_modes import receptance_roots, softly_held
 from frf_ipz.numerics.pole_sums import PoleSums
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 FRFS_AT_ONCE, LINES_AT_ONCE = 64, 128
-SOFT = 1e-3  # of the lowest line: frequency given to rigid-body modes, whose double poles at 0 have no residues
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,17 +39,12 @@ class ModelEnsemble:
         mass, stiffness = self.matrices[:, 0], self.matrices[:, 2]
         lower = np.linalg.inv(np.linalg.cholesky(mass))
         values, vectors = np.linalg.eigh(lower @ stiffness @ lower.swapaxes(1, 2))
-        return np.maximum(values, (SOFT * self.lowest_rad_s) ** 2), lower.swapaxes(1, 2) @ vectors
+        return softly_held(values, self.lowest_rad_s), lower.swapaxes(1, 2) @ vectors
 
     @cached_property
     def roots(self) -> list[tuple[ComplexArray, ComplexArray, ComplexArray]]:
-        """Of each member k poles, and right and left vectors (r, k) whose product is the receptance's residue.
-
-        Conjugates are left out; the vectors of real poles are halved, so that each sum with its conjugate is whole.
-        """
-        squares, shapes = self.modes
-        rates = shapes.swapaxes(1, 2) @ self.matrices[:, 1] @ shapes
-        return [_roots(*member) for member in zip(squares, shapes, rates, strict=True)]
+        """Of each member k poles, and right and left vectors (r, k) whose products are the residues."""
+        return [receptance_roots(*member) for member in zip(*self.modes, self.matrices[:, 1], strict=True)]
 
     def receptance(self, output: FloatArray, force: FloatArray, s: ComplexArray) -> ComplexArray:
         """Evaluate one FRF of every member.
@@ -116,10 +110,3 @@ class ModelEnsemble:
         """
         shapes = self.modes[1][:, :, :count]
         return np.asarray((output @ shapes) * (force @ shapes))
-
-
-def _roots(
-    squares: FloatArray, shapes: FloatArray, rates: FloatArray
-) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    poles, vectors, left_vectors = damped_modes(squares, (rates + rates.T) / 2)
-    return poles, shapes @ vectors, shapes @ left_vectors * np.where(poles.imag > 0, 1.0, 0.5)

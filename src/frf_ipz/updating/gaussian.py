@@ -711,16 +711,14 @@ def _drawn_scales(
     """
     search = _ScaleSearch(linear, terms, np.array([term.scale_uncertainty > 0 for term in terms]), scales, factor)
     center = np.log(scales)[search.free]
-    top = search.evaluate(center)
-    if top is None:
-        raise np.linalg.LinAlgError(INDEFINITE)
+    top = search.evidence(center)
     if not len(center) or not len(linear.data) or not count:
         yield top, np.arange(count)
         return
     root = np.linalg.cholesky(top.curvature())
     white = rng.standard_normal(((count + DRAWS_OF_A_SCALE - 1) // DRAWS_OF_A_SCALE, len(center)))
     white[len(white) // 2 :] = -white[: len(white) - len(white) // 2]
-    found = [search.evaluate(logs) for logs in center + np.linalg.solve(root.T, white.T).T]
+    found = [search.try_evidence(logs) for logs in center + np.linalg.solve(root.T, white.T).T]
     told = [number for number, evidence in enumerate(found) if evidence is not None]
     tried = [evidence for evidence in found if evidence is not None]
     logs_of_weights = 0.5 * np.sum(white[told] ** 2, axis=1) - np.array([evidence.value for evidence in tried])
@@ -755,9 +753,7 @@ def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: Fl
         return start
     search = _ScaleSearch(linear, terms, free, start)
     logs = np.clip(np.log(start)[free], search.low, search.high)
-    evidence = search.evaluate(logs)
-    if evidence is None:
-        raise np.linalg.LinAlgError(INDEFINITE)
+    evidence = search.evidence(logs)
     curvature, gain_before = None, 0.0
     for _ in range(MAX_SCALE_STEPS):
         slope = evidence.slope
@@ -774,7 +770,7 @@ def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: Fl
             break
         for _ in range(MAX_HALVINGS):
             tried = np.clip(logs + step, search.low, search.high)
-            new = search.evaluate(tried)
+            new = search.try_evidence(tried)
             if new is not None and new.value <= evidence.value:
                 break
             step /= 2
@@ -826,17 +822,21 @@ class _ScaleSearch:
             step[open_ones] = -np.linalg.solve(curvature[np.ix_(open_ones, open_ones)], slope[open_ones])
         return step * min(1.0, LARGEST_SCALE_STEP / max(float(np.abs(step).max()), np.finfo(float).tiny))
 
-    def evaluate(self, logs: FloatArray) -> _Evidence | None:
-        """Value there; slope and expected curvature on demand; None where double precision cannot tell."""
+    def try_evidence(self, logs: FloatArray) -> _Evidence | None:
+        """Value there; None where scales are so large that what rounding leaves of the prior is not positive."""
+        try:
+            return self.evidence(logs)
+        except np.linalg.LinAlgError:
+            return None
+
+    def evidence(self, logs: FloatArray) -> _Evidence:
+        """Value there; slope and expected curvature on demand."""
         scales = self.start.copy()
         scales[self.free] = np.exp(logs)
         linear, count = self.linear, len(self.linear.bases)
         has_slack = len(self.terms) > count
         factor = float(scales[-1]) if has_slack else self.held
-        try:
-            root, right = linear.information(scales[:count], factor)
-        except np.linalg.LinAlgError:  # so large that what rounding leaves of the prior is not positive
-            return None
+        root, right = linear.information(scales[:count], factor)
         mean = cho_solve((root, False), right, check_finite=False)
         weights = 1 / (linear.level + factor**2)
         value = 0.5 * float(weights @ linear.data**2 - right @ mean) + float(np.log(np.diagonal(root)).sum())

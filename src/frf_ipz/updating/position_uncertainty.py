@@ -18,11 +18,10 @@ from scipy.linalg import eigh
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.dofs import AnyDof
 from frf_ipz.identification.root_covariance import RootCovariance
-from frf_ipz.numerics.damped_modes import damped_modes
+from frf_ipz.numerics.damped_modes import receptance_roots, softly_held
 from frf_ipz.numerics.pole_forms import damped_form
 
 DRAWS, SEED = 32, 0  # of all positions: the root of a mean square of so many is known to a third
-SOFT = 1e-3  # of the lowest zero: frequency given to rigid-body modes, whose double poles at 0 have no residues
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
@@ -180,13 +179,11 @@ class _Receptance:
     def at_zeros(cls, problem: UpdateProblem, zeros: IntArray) -> _Receptance:
         model = problem.model
         squares, shapes = eigh(model.stiffness, model.mass)
-        rates = shapes.T @ model.damping @ shapes
-        least = SOFT * np.abs(problem.computed[zeros]).min()
-        poles, right, left = damped_modes(np.maximum(squares, least**2), (rates + rates.T) / 2)
+        squares = softly_held(squares, float(np.abs(problem.computed[zeros]).min()))
+        roots = receptance_roots(squares, shapes, model.damping)
         rows = {frf: problem.rows(frf) for frf in np.unique(problem.frf[zeros]).tolist()}
         outputs, inputs = (np.array([rows[frf][side] for frf in problem.frf[zeros].tolist()]) for side in range(2))
-        whole = np.where(poles.imag > 0, 1.0, 0.5)
-        return cls(poles, shapes @ right, shapes @ left * whole, outputs, inputs)
+        return cls(*roots, outputs, inputs)
 
     def newton_step(self, outputs: FloatArray, inputs: FloatArray, s: ComplexArray) -> ComplexArray:
         """Step from s (n,) to the zero, where the rows of sensors and excitations change by (n, r) arrays."""
