@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -158,7 +159,10 @@ def test_ctrl_c_leaves_what_is_done(fleet, tmp_path, jobs):
     out = tmp_path / "out"
     command = [sys.executable, "-m", "frf_ipz", "fleet", str(fleet), "--out", str(out), "--jobs", jobs]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment, start_new_session=True)
+    heeding = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a shell has what it puts behind ignore it
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, env=environment, start_new_session=True, preexec_fn=heeding
+    )
     until = time.monotonic() + PATIENCE_S
     while len(whole_results(out)) < 3:
         assert time.monotonic() < until
