@@ -16,12 +16,13 @@ import frf_ipz
 
 Band = tuple[float, float]
 SURE, SAME = 0.9, 0.5  # found_again; half widths within which two poles are one mode
-EDGE, NOISE, SEEDS, MOST_LEFT_OUT = 0.02, 0.01, 3, 5
+EDGE, NOISE, SEEDS, MOST_LEFT_OUT = 0.02, 0.01, 5, 5
+EDGES = [(low, high) for low in (0, 1, -1) for high in (0, 1, -1) if low or high]  # in units of EDGE
 
 
 def perturbed(path: str, frfs: frf_ipz.FrfSet, band: Band) -> Iterator[tuple[str, frf_ipz.FrfSet, Band]]:
     """Give name, FRFs and band of each perturbation."""
-    for low, high in ((1, 0), (-1, 0), (0, 1), (0, -1), (1, -1)):
+    for low, high in EDGES:
         yield f"edges {low:+d} {high:+d}", frfs, (band[0] * (1 + low * EDGE), band[1] * (1 + high * EDGE))
     for seed in range(SEEDS):
         size = NOISE * np.abs(frfs.values) / np.sqrt(2)
