@@ -120,9 +120,9 @@ def write_campaign(folder, *, records=3, seed=1):
     return folder / "pipeline.toml"
 
 
-def write_quick_campaign(folder):
+def write_quick_campaign(folder, **options):
     """The same for tests of what becomes of the files, whatever their numbers: one cause, and a small ensemble."""
-    pipeline = write_campaign(folder)
+    pipeline = write_campaign(folder, **options)
     text = pipeline.read_text()
     for old, new in QUICK:
         text = text.replace(old, new)

@@ -21,10 +21,11 @@ import frf_ipz
 from fleet_case import write_fleet
 from frf_ipz.cli.main import STOPPED
 from frf_ipz.runs.generations import stamp
+from small_campaign import write_quick_campaign
 
 pytestmark = pytest.mark.slow
 
-COUNT = int(os.environ.get("MACHINES", "12"))
+COUNT = int(os.environ.get("MACHINES", "10"))
 TABLES = ("fleet", "fleet_poles", "fleet_zeros", "fleet_parameters", "fleet_findings")
 PATIENCE_S = 300.0
 DASK = (sys.executable, "-m", "distributed.cli")
@@ -32,7 +33,8 @@ DASK = (sys.executable, "-m", "distributed.cli")
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory):
-    return write_fleet(tmp_path_factory.mktemp("fleet"), COUNT, more='pages = "none"\n')
+    folder = tmp_path_factory.mktemp("fleet")
+    return write_fleet(folder, COUNT, more='pages = "none"\n', write=write_quick_campaign)
 
 
 @pytest.fixture(scope="module")
