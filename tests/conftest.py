@@ -1,5 +1,6 @@
 """Fixtures shared by all tests."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -11,6 +12,12 @@ settings.register_profile("dev", deadline=None)
 settings.register_profile("long", deadline=None, max_examples=10_000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 SHARED = Path(__file__).parents[2] / "shared"
+
+
+def pytest_collection_finish():
+    """What has been collected stays to the end: no search for garbage needs to go through it, and there are many."""
+    gc.collect()
+    gc.freeze()
 
 
 def _folder(name):
