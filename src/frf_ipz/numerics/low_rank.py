@@ -12,13 +12,13 @@ from frf_ipz.arrays import ComplexArray, FloatArray, IntArray, Matrix
 
 Vectors: TypeAlias = ComplexArray | FloatArray
 ROUNDING = 1e-10  # of the largest entry or eigenvalue of a matrix
-PAIRS_AT_ONCE = 256  # of vectors, for `add_forms`: what is made of them stays in the cache
+PAIRS_AT_ONCE = 64  # of vectors, for `add_forms`: what is made of them stays in the cache
 SPARSE = 0.1  # of the entries of all vectors, up to which sparse products are faster
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LowRankMatrices:
-    """Symmetric matrices ``A_p``: of one entry each, or ``sum of e q q^T``.
+    """Symmetric matrices ``A_p``: of one entry each, ``sum of e q q^T``, or whole where there are many q.
 
     Parameters
     ----------
@@ -36,6 +36,10 @@ class LowRankMatrices:
         Those of the others that are not zero.
     starts : (k,) int array
         Where the vectors of each of these begin.
+    whole : (w, r, r) array
+        Those whose vectors would be more than half as many as their rows.
+    whole_owners : (w,) int array
+        Which matrices these are.
     count : int
         Number of matrices.
     """
@@ -48,6 +52,8 @@ class LowRankMatrices:
     weights: FloatArray
     owners: IntArray
     starts: IntArray
+    whole: FloatArray
+    whole_owners: IntArray
     count: int
 
     def forms(self, left: Vectors, right: Vectors) -> FloatArray:
@@ -77,11 +83,14 @@ class LowRankMatrices:
         left, right : (r, n) array
             y and x.
         """
-        self._add(result, left.real, right.real, 1.0)
-        if np.any(left.imag) and np.any(right.imag):
-            self._add(result, left.imag, right.imag, -1.0)
+        self._add(result, slice(None), left.real, right.real, 1.0)
+        turned = np.flatnonzero(np.any(left.imag, axis=0) & np.any(right.imag, axis=0))
+        if len(turned):
+            self._add(result, turned, left.imag[:, turned], right.imag[:, turned], -1.0)
 
-    def _add(self, result: FloatArray, left: FloatArray, right: FloatArray, sign: float) -> None:
+    def _add(
+        self, result: FloatArray, pairs: slice | IntArray, left: FloatArray, right: FloatArray, sign: float
+    ) -> None:
         if len(self.entries):
             y, x = np.ascontiguousarray(left.T), np.ascontiguousarray(right.T)
             forms = np.take(y, self.rows, axis=1)
@@ -90,13 +99,24 @@ class LowRankMatrices:
             mirrored *= np.take(x, self.rows, axis=1)
             forms += mirrored
             forms *= sign * np.where(self.rows == self.columns, 0.5, 1.0) * self.entries
-            result[:, _places(self.entry_owners)] += forms
+            _add_at(result, pairs, self.entry_owners, forms)
         if len(self.owners):
             turned = self.vectors.T
             products = np.asarray(turned @ left) * np.asarray(turned @ right) * (sign * self.weights[:, None])
             if len(self.starts) < len(products):
                 products = np.add.reduceat(products, self.starts, axis=0)
-            result[:, _places(self.owners)] += products.T
+            _add_at(result, pairs, self.owners, products.T)
+        if len(self.whole):
+            moved = (self.whole.reshape(-1, len(right)) @ right).reshape(len(self.whole), *right.shape)
+            _add_at(result, pairs, self.whole_owners, sign * np.einsum("wrn,rn->nw", moved, left))
+
+
+def _add_at(result: FloatArray, rows: slice | IntArray, columns: IntArray, forms: FloatArray) -> None:
+    places = _places(columns)
+    if isinstance(rows, slice) or isinstance(places, slice):
+        result[rows, places] += forms
+    else:
+        result[rows[:, None], places] += forms
 
 
 def _places(indices: IntArray) -> IntArray | slice:
@@ -133,6 +153,8 @@ def of_entries(rows: IntArray, columns: IntArray) -> LowRankMatrices:
         weights=np.zeros(0),
         owners=nothing,
         starts=nothing,
+        whole=np.zeros((0, 0, 0)),
+        whole_owners=nothing,
         count=len(rows),
     )
 
@@ -161,6 +183,7 @@ def factorise(matrices: FloatArray) -> LowRankMatrices:
     at_row: list[int] = []
     at_column: list[int] = []
     vectors, weights, owners, starts, used = [], [], [], [], 0
+    whole_owners: list[int] = []
     for number, matrix in enumerate(matrices):
         size = np.abs(matrix).max(axis=1, initial=0.0)
         rows = np.flatnonzero(size > ROUNDING * size.max(initial=0.0))
@@ -175,6 +198,9 @@ def factorise(matrices: FloatArray) -> LowRankMatrices:
             continue
         values, directions = np.linalg.eigh(small)
         kept = np.abs(values) > ROUNDING * np.abs(values).max()
+        if 2 * kept.sum() > order:
+            whole_owners.append(number)
+            continue
         whole = np.zeros((order, int(kept.sum())))
         whole[rows] = directions[:, kept]
         vectors.append(whole)
@@ -192,5 +218,7 @@ def factorise(matrices: FloatArray) -> LowRankMatrices:
         weights=np.concatenate(weights) if weights else np.zeros(0),
         owners=np.array(owners, np.int64),
         starts=np.array(starts, np.int64),
+        whole=matrices[whole_owners],
+        whole_owners=np.array(whole_owners, np.int64),
         count=len(matrices),
     )

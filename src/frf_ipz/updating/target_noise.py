@@ -96,6 +96,29 @@ class TargetNoise:
             yield np.arange(first, first + len(block)), block
             first += len(block)
 
+    def square(self, error: FloatArray) -> float:
+        """Weigh an error by the inverse of the covariance, which has to be positive definite.
+
+        Parameters
+        ----------
+        error : (n,) array
+            Of the data.
+
+        Returns
+        -------
+        float
+            ``e^T R^-1 e``.
+        """
+        own, shared = 0.0, np.zeros(self.common.shape[1])
+        information = np.eye(len(shared))
+        for part, block in self.parts():
+            both = np.column_stack([error[part], self.common[part]])
+            white = solve_triangular(cholesky(block, lower=True), both, lower=True)
+            own += float(white[:, 0] @ white[:, 0])
+            shared += white[:, 1:].T @ white[:, 0]
+            information += white[:, 1:].T @ white[:, 1:]
+        return own - float(shared @ np.linalg.solve(information, shared))
+
     def draw(self, white: FloatArray) -> FloatArray:
         """Give errors with this covariance: its lower Cholesky factor times white ones.
 

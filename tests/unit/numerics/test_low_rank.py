@@ -27,6 +27,16 @@ def test_forms_are_those_of_the_matrices(symmetric, imaginary):
     assert np.abs(factorise(symmetric).forms(left, right) - expected.real).max() < 1e-9 * np.abs(expected).max()
 
 
+def test_forms_of_real_pairs_beside_complex_ones(symmetric):
+    rng = np.random.default_rng(2)
+    left, right = rng.standard_normal((2, ORDER, 6)) + 1j * rng.standard_normal((2, ORDER, 6))
+    left.imag[:, ::2] = right.imag[:, 1] = 0.0
+    expected = np.einsum("in,pij,jn->np", left, symmetric, right).real
+    for chosen in (symmetric, symmetric[[1, 5, 2]], symmetric[[4, 0, 3]]):
+        of_chosen = np.einsum("in,pij,jn->np", left, chosen, right).real
+        assert np.abs(factorise(chosen).forms(left, right) - of_chosen).max() < 1e-9 * np.abs(expected).max()
+
+
 def test_a_pair_of_modes_is_one_entry(symmetric):
     found = factorise(symmetric[-1:])
     assert (found.rows.tolist(), found.columns.tolist(), found.entries.tolist()) == ([1], [4], [3.0])

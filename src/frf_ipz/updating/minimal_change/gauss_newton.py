@@ -267,8 +267,7 @@ def iterate(
 
 def _cost(state: _Iterate, noise: TargetNoise) -> float:
     """Weigh change and misfit together, without the noise that stands for curvature."""
-    misfit = linearise((), state.error, noise).square(state.error, 0.0)
-    return float(state.whitened @ state.whitened) + misfit
+    return float(state.whitened @ state.whitened) + noise.square(state.error)
 
 
 def _explained(linear: Linearised, scales: FloatArray, mean: FloatArray) -> FloatArray:
@@ -319,7 +318,7 @@ def _history_row(
 ) -> dict[str, float]:
     return {
         "iteration": iteration,
-        "misfit": linearise((), error, noise).square(error, 0.0),
+        "misfit": noise.square(error),
         "step": fraction,
         "largest_error": float(np.abs(error).max(initial=0.0)),
         "size_of_change": float(np.linalg.norm(step.mean)),
