@@ -19,7 +19,6 @@ from frf_ipz.frf import FrfSet
 from frf_ipz.identification.likelihood.compression import response
 from frf_ipz.identification.likelihood.covariance import FitErrors, fit_errors, value_std
 from frf_ipz.identification.likelihood.refinement import refine_poles
-from frf_ipz.identification.likelihood.sandwich import force_noise_factors
 from frf_ipz.identification.likelihood.smooth_terms import smooth_terms_of_band
 from frf_ipz.identification.measured_lines import measured_lines, with_misfit_noise
 from frf_ipz.identification.modal_fit import ModalFit
@@ -208,10 +207,7 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
     modes = order[:n_modes]
     unconfirmed = unconfirmed_reasons(halves, modes)
     factor, shift = (halves.variance_factor, halves.shift) if halves else (1.0, np.zeros(2 * len(fit.poles)))
-    by_force = np.ones(2 * len(fit.poles))
-    if fitted.noise_from == "recordings" and fitted.force_error is None:
-        by_force = force_noise_factors(lines, fit, terms)
-    errors = fit_errors(fit, terms, variance_factors(fitted) * factor, shift, by_force)
+    errors = fit_errors(fit, terms, variance_factors(fitted) * factor, shift)
     # errors of the poles change equal FRFs by the same: gains follow from the other errors alone
     residue_errors = replace(errors, pole_root=np.zeros_like(errors.pole_root))
     gains = find_channel_gains(

@@ -90,9 +90,7 @@ class FitErrors:
         return np.concatenate([a * real - b * imag, b * real + a * imag])
 
 
-def fit_errors(
-    fit: RefinedPoles, terms: SmoothTerms, level: FloatArray, shift: FloatArray, of_poles: FloatArray | float = 1.0
-) -> FitErrors:
+def fit_errors(fit: RefinedPoles, terms: SmoothTerms, level: FloatArray, shift: FloatArray) -> FitErrors:
     """Find where errors of a fit come from.
 
     Parameters
@@ -106,8 +104,6 @@ def fit_errors(
         common.
     shift : (2 n_poles,) array
         Standard deviation of the same that does not come from noise, rad/s.
-    of_poles : (2 n_poles,) array, optional
-        Factor on the variance of each pole alone, where lines share a part of the noise.
 
     Returns
     -------
@@ -119,7 +115,7 @@ def fit_errors(
     return FitErrors(
         system=fit.system,
         terms=terms,
-        pole_root=root * np.sqrt(level * of_poles + shift**2 / stated)[:, None],
+        pole_root=root * np.sqrt(level + shift**2 / stated)[:, None],
         level=float(np.sqrt(np.median(level))),
         residues=fit.system.scaled_residues(),
     )
