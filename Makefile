@@ -3,7 +3,9 @@ PYTHON ?= python3
 BIN := .venv/bin
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
-# --no-compile: Python compiles what it imports the first time; compiling all of every package takes half of the set-up.
+# --no-compile: Python compiles what it imports the first time, and keeps it, whatever the environment says; compiling
+# all of every package takes half of the set-up.
+unexport PYTHONDONTWRITEBYTECODE
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 PARALLEL := -n auto --dist loadfile --no-loadscope-reorder
 LOCK := $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
