@@ -54,3 +54,8 @@ def test_a_report_has_no_fault(screen, tmp_path):
 def test_a_page_that_is_shown_has_no_fault(screen, address):
     Page(screen, address)
     assert faults(screen) == []
+
+
+def test_a_fault_is_found(browser):
+    browser.get("data:text/html,<html lang=en><title>A page</title><main><h1>A page</h1><img src=x></main>")
+    assert [name for name, _ in faults(browser)] == ["image-alt"]
