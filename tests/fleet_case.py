@@ -3,6 +3,7 @@
 import numpy as np
 
 import small_campaign
+from small_campaign import write_campaign
 
 FLEET = """
 [fleet]
@@ -13,10 +14,10 @@ machines = "machines/*/test.toml"
 """
 
 
-def write_fleet(folder, count, *, seed=0, scatter=0.01, factors=(), records=2, more="", write=None):
+def write_fleet(folder, count, *, seed=0, scatter=0.01, factors=(), records=2, more="", write=write_campaign):
     """Write `fleet.toml` with machines m01, m02 and so on; `factors` are on the modulus of the first ones.
 
-    `write` makes a campaign otherwise than `small_campaign.write_campaign`.
+    `write` makes the campaign of each.
     """
     rng = np.random.default_rng(seed)
     whole = small_campaign.YOUNG
@@ -25,7 +26,7 @@ def write_fleet(folder, count, *, seed=0, scatter=0.01, factors=(), records=2, m
             factor = factors[number - 1] if number <= len(factors) else 1 + scatter * rng.standard_normal()
             small_campaign.YOUNG = whole * factor
             machine = folder / "machines" / f"m{number:02d}"
-            (write or small_campaign.write_campaign)(machine, records=records, seed=seed + number)
+            write(machine, records=records, seed=seed + number)
             for name in ("model.toml", "pipeline.toml"):
                 (machine / name).rename(folder / name)
     finally:
