@@ -375,7 +375,7 @@ def linearise(
     del pieces  # large
     bases: tuple[FloatArray | None, ...] = (None,) * (len(ends) - 1)
     sums: list[tuple[FloatArray, FloatArray]] = []
-    if combining and bases:
+    if combining:
         total = _sum_of_products(joined, 1 / level)
         columns = [slice(first, end) for first, end in pairwise(ends)]
         stds = np.ones(len(columns)) if scales is None else scales
