@@ -126,6 +126,7 @@ class Watch:
         self.out = str(out)
         self.noted = []
         warnings.simplefilter("ignore")  # numbers that make no sense may be said to make none
+        sys.dont_write_bytecode = True  # what Python keeps of a module that a view imports is not the view's doing
         sys.addaudithook(self._note)
 
     def _note(self, event, arguments):
