@@ -11,7 +11,9 @@ doi:10.1016/j.jcp.2009.08.031.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
+from typing import TypedDict
 
 import numpy as np
 from scipy import sparse
@@ -23,6 +25,7 @@ from frf_ipz.numerics.partial_fractions import pair_rows
 FAR = 3.0
 NODES = 18
 LINES_OF_SMALLEST = 128  # of the smallest intervals: fewer would cost more in calls than they save
+LINES_OF_TILE = 128  # at most
 ANGLES = (2 * np.arange(NODES) + 1) * np.pi / (2 * NODES)
 
 
@@ -32,20 +35,24 @@ class LineSums:
 
     Parameters
     ----------
-    s : (n_lines,) complex array
-        Lines by ascending frequency, all with the same real part, rad/s.
-    rows : (n_lines, 2, n_rows) array
-        Real and imaginary part of what the fractions are multiplied with.
-    first : (n_intervals + 1,) int array
-        First line of each of the smallest intervals.
+    ends : (2,) complex array
+        First and last line, rad/s.
     levels : tuple of (2^k, 2, n_nodes, n_rows) arrays
-        From the whole band to the smallest intervals, what stands for the lines at the nodes of each interval.
+        From the whole band to the smallest intervals, what stands for the lines at the nodes of each interval: real and
+        imaginary part of what the fractions are multiplied with.
+    first_tile : (n_intervals + 1,) int array
+        Where the lines of each of the smallest intervals begin among the tiles.
+    tile_s : (n_tiles, n) complex array
+        Lines of each tile, rad/s; the last is repeated where there are fewer.
+    tile_rows : (n_tiles, 2, n, n_rows) array
+        Their rows, real and imaginary part; zero for what is repeated.
     """
 
-    s: ComplexArray
-    rows: FloatArray
-    first: IntArray
+    ends: ComplexArray
     levels: tuple[FloatArray, ...]
+    first_tile: IntArray
+    tile_s: ComplexArray
+    tile_rows: FloatArray
 
     @staticmethod
     def of_lines(s: ComplexArray, rows: ComplexArray) -> LineSums:
@@ -82,7 +89,7 @@ class LineSums:
             while len(levels[-1]) > 1:
                 fine = levels[-1]
                 levels.append(halves[0] @ fine[::2] + halves[1] @ fine[1::2])
-        return LineSums(s=s, rows=np.stack([rows.real, rows.imag], axis=1), first=first, levels=tuple(levels[::-1]))
+        return LineSums(ends=s[[0, -1]], levels=tuple(levels[::-1]), **_tiles(s, rows, first))
 
     def products(self, poles: ComplexArray) -> FloatArray:
         """Multiply the columns of poles, as `pair_columns` gives them, with the rows.
@@ -97,9 +104,9 @@ class LineSums:
         (4, n_poles, n_rows) array
             For the real and the imaginary parts of residues, and for those of the slopes.
         """
-        total = np.zeros((len(poles), 4, self.rows.shape[2]))
+        total = np.zeros((len(poles), 4, self.tile_rows.shape[3]))
         pole, interval = np.arange(len(poles)), np.zeros(len(poles), np.int64)
-        low, high = self.s[0], self.s[-1]
+        low, high = self.ends
         for level in self.levels:
             half = (high.imag - low.imag) / len(level) / 2
             middle = low + 1j * half * (2 * interval + 1)
@@ -110,12 +117,21 @@ class LineSums:
             interval[1::2] += 1
         if self.levels:
             pole, interval = pole[::2], interval[::2] // 2  # the smallest have no halves
-        for number in np.unique(interval[np.diff(self.first)[interval] > 0]).tolist():
-            neighbours, lines = pole[interval == number], slice(self.first[number], self.first[number + 1])
-            columns = _columns(self.s[None, lines], poles[neighbours])
-            rows = self.rows[lines].transpose(1, 0, 2).reshape(-1, total.shape[2])
-            total[neighbours] += (columns.reshape(-1, len(rows)) @ rows).reshape(len(neighbours), 4, -1)
+        self._add_lines(total, poles, pole, interval)
         return total.transpose(1, 0, 2)
+
+    def _add_lines(self, total: FloatArray, poles: ComplexArray, pole: IntArray, interval: IntArray) -> None:
+        """Add the lines of intervals next to poles one by one."""
+        count = np.diff(self.first_tile)[interval]
+        pole, tile = np.repeat(pole, count), _ranges(self.first_tile[interval], count)
+        order = np.argsort(tile, kind="stable")
+        pole, tile = pole[order], tile[order]
+        columns = _columns(self.tile_s[tile], poles[pole])
+        starts = np.flatnonzero(np.diff(tile, prepend=-1, append=-1)).tolist()
+        for first, end in itertools.pairwise(starts):
+            rows = self.tile_rows[tile[first]].reshape(-1, total.shape[2])
+            products = columns[first:end].reshape(-1, len(rows)) @ rows
+            total[pole[first:end]] += products.reshape(end - first, 4, -1)
 
     def seen_from(self, poles: ComplexArray) -> tuple[ComplexArray, FloatArray]:
         """Give lines next to poles, and nodes that stand for all others.
@@ -132,7 +148,7 @@ class LineSums:
         rows : (n, 2, n_rows) array
             Their rows: for sums of whatever varies no faster than products of the poles' columns.
         """
-        interval, low, band = np.zeros(1, np.int64), self.s[0], self.s[-1].imag - self.s[0].imag
+        interval, low, band = np.zeros(1, np.int64), self.ends[0], self.ends[1].imag - self.ends[0].imag
         places, rows = [], []
         for level in self.levels:
             half = band / len(level) / 2
@@ -143,11 +159,36 @@ class LineSums:
             interval = (2 * interval[~is_far, None] + np.arange(2)).ravel()
         if self.levels:
             interval = interval[::2] // 2
-        lines = [slice(self.first[number], self.first[number + 1]) for number in interval.tolist()]
-        return (
-            np.concatenate([*places, *(self.s[part] for part in lines)]),
-            np.concatenate([*rows, *(self.rows[part] for part in lines)]),
-        )
+        tile = _ranges(self.first_tile[interval], np.diff(self.first_tile)[interval])
+        places.append(self.tile_s[tile].ravel())
+        n_rows = self.tile_rows.shape[3]
+        rows.append(self.tile_rows[tile].transpose(0, 2, 1, 3).reshape(len(places[-1]), 2, n_rows))
+        return np.concatenate(places), np.concatenate(rows)
+
+
+class _Tiles(TypedDict):
+    first_tile: IntArray
+    tile_s: ComplexArray
+    tile_rows: FloatArray
+
+
+def _tiles(s: ComplexArray, rows: ComplexArray, first: IntArray) -> _Tiles:
+    """Cut the lines of intervals into tiles that are equally long."""
+    count = np.diff(first)
+    length = -(-count.max() // -(-count.max() // LINES_OF_TILE))
+    of_interval = -(-count // length)
+    first_tile = np.concatenate([[0], np.cumsum(of_interval)])
+    tile = np.arange(first_tile[-1]) - np.repeat(first_tile[:-1], of_interval)
+    line = np.repeat(first[:-1], of_interval)[:, None] + length * tile[:, None] + np.arange(length)
+    end = np.repeat(first[1:], of_interval)[:, None]
+    is_line, line = line < end, np.minimum(line, end - 1)
+    parts = np.stack([rows.real, rows.imag])[:, line] * is_line[..., None]
+    return _Tiles(first_tile=first_tile, tile_s=s[line], tile_rows=np.ascontiguousarray(parts.transpose(1, 0, 2, 3)))
+
+
+def _ranges(first: IntArray, count: IntArray) -> IntArray:
+    """Count up from several numbers, so many each."""
+    return np.arange(count.sum()) + np.repeat(first - np.cumsum(count) + count, count)
 
 
 def _interpolation(places: FloatArray) -> FloatArray:

@@ -90,3 +90,9 @@ def test_lost_digits_are_told(half_width_hz, power):
     growth = pair_error_growth(poles, values, slopes, 0.0)
     assert growth[0] > 1e4
     assert growth[-3] < 1e3
+
+
+def test_where_all_lines_are_far_nodes_stand_for_all():
+    s, poles = lines_of(np.arange(1000, 3000) * 0.33), poles_of()[:1]
+    places, rows = LineSums.of_lines(s, rows_of(s)).seen_from(poles)
+    assert len(places) == len(rows) < len(s) / 10
