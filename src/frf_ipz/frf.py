@@ -73,6 +73,51 @@ class FrfLabel:
         return self.output_dof.sign * self.input_dof.sign
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ForceNoise:
+    """What the noise of the force makes of FRFs: an error that neighbouring lines share.
+
+    The force of an impact is kept for a short time, and its noise with it. So FRFs are off by the factor
+    ``1 + sum_k n_k exp(-i omega t_k) / F``, over the samples of that time.
+
+    Parameters
+    ----------
+    relative : (n_lines, n_frfs) complex array
+        Root of the mean square of that error, relative to the FRF, with the phase of ``1 / F``.
+    force : (n_frfs,) int array
+        Which FRFs were measured with the same impacts, by a number.
+    interval_s : pair of float
+        First and last time for which the force is kept, from the impact on, s.
+    """
+
+    relative: ComplexArray
+    force: IntArray
+    interval_s: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        require_finite("the noise of the force", self.relative)
+        require_shape("the numbers of the forces", self.force, self.relative.shape[1:])
+        for name in ("relative", "force"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    def of(self, lines: BoolArray | slice, frfs: Sequence[int] | slice) -> ForceNoise:
+        """Select lines and FRFs.
+
+        Parameters
+        ----------
+        lines : (n_lines,) bool array or slice
+            Lines to select.
+        frfs : sequence of int or slice
+            FRFs to select.
+
+        Returns
+        -------
+        ForceNoise
+            Theirs.
+        """
+        return replace(self, relative=self.relative[lines][:, frfs], force=self.force[frfs])
+
+
 class Measured(Protocol):
     """What says which FRFs were measured, and where: a `FrfSet`, or the `ModalFit` of one."""
 
@@ -140,6 +185,8 @@ class FrfSet(Tabulated, Drawn):
     correlated_lines : int
         Neighbouring lines whose errors are hardly independent, as under an exponential window: who counts lines as
         evidence takes one in so many.
+    force_noise : ForceNoise, optional
+        The part of `variance` that neighbouring lines share.
 
     Raises
     ------
@@ -175,6 +222,7 @@ class FrfSet(Tabulated, Drawn):
     window_decay_1_s: float = 0.0
     unknown_scale: str = "none"
     correlated_lines: int = 1
+    force_noise: ForceNoise | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.frequency_hz), len(self.labels))
@@ -182,6 +230,8 @@ class FrfSet(Tabulated, Drawn):
             require_shape(f"the FRFs' {name}", getattr(self, name), shape)
         require_shape("the FRFs' averages", self.averages, shape[1:])
         require_finite("the FRFs' values", self.values)
+        if self.force_noise is not None:
+            require_shape("the FRFs' force_noise", self.force_noise.relative, shape)
         for name in ARRAYS:
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
@@ -364,7 +414,12 @@ class FrfSet(Tabulated, Drawn):
             The same FRFs on fewer lines.
         """
         rows = ("values", "variance", "coherence")
-        return replace(self, frequency_hz=self.frequency_hz[used], **{name: getattr(self, name)[used] for name in rows})
+        return replace(
+            self,
+            frequency_hz=self.frequency_hz[used],
+            force_noise=None if self.force_noise is None else self.force_noise.of(used, slice(None)),
+            **{name: getattr(self, name)[used] for name in rows},
+        )
 
     def select_frfs(self, indices: Sequence[int]) -> FrfSet:
         """Select FRFs by their numbers.
@@ -385,6 +440,7 @@ class FrfSet(Tabulated, Drawn):
             self,
             labels=tuple(self.labels[index] for index in selected),
             averages=self.averages[selected],
+            force_noise=None if self.force_noise is None else self.force_noise.of(slice(None), selected),
             **{name: getattr(self, name)[:, selected] for name in columns},
         )
 

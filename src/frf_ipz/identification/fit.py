@@ -13,12 +13,13 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arguments import require_type, take_array
-from frf_ipz.arrays import ComplexArray, IntArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfSet
 from frf_ipz.identification.likelihood.compression import response
 from frf_ipz.identification.likelihood.covariance import FitErrors, fit_errors, value_std
 from frf_ipz.identification.likelihood.refinement import refine_poles
+from frf_ipz.identification.likelihood.sandwich import force_noise_factors
 from frf_ipz.identification.likelihood.smooth_terms import smooth_terms_of_band
 from frf_ipz.identification.measured_lines import measured_lines, with_misfit_noise
 from frf_ipz.identification.modal_fit import ModalFit
@@ -207,7 +208,8 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
     modes = order[:n_modes]
     unconfirmed = unconfirmed_reasons(halves, modes)
     factor, shift = (halves.variance_factor, halves.shift) if halves else (1.0, np.zeros(2 * len(fit.poles)))
-    errors = fit_errors(fit, terms, variance_factors(fitted) * factor, shift)
+    shared = _shared_noise_factors(frfs, fitted)
+    errors = fit_errors(fit, terms, variance_factors(fitted) * factor, shift, pole_factors=shared)
     # errors of the poles change equal FRFs by the same: gains follow from the other errors alone
     residue_errors = replace(errors, pole_root=np.zeros_like(errors.pole_root))
     gains = find_channel_gains(
@@ -249,6 +251,14 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
         warnings=(*_warnings(frfs, fitted, halves, unconfirmed), *gains.remarks),
         unknown_scale=frfs.unknown_scale,
     )
+
+
+def _shared_noise_factors(frfs: FrfSet, fitted: FittedModes) -> FloatArray:
+    """Find the factors on variances of poles by noise of the force, where nothing larger hides it; else 1."""
+    is_alone = fitted.noise_from == "recordings" and fitted.force_error is None and not of_one_impact(frfs).any()
+    if fitted.poles_are_held or not is_alone:
+        return np.ones(2 * len(fitted.fit.poles))
+    return force_noise_factors(fitted.lines, fitted.fit, fitted.terms)
 
 
 def _decisions(fitted: FittedModes, modes: IntArray, unconfirmed: tuple[str, ...]) -> pd.DataFrame:

@@ -12,7 +12,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.identification.noise import BLOCK_LINES, misfit_variance, rough_variance
 
 if TYPE_CHECKING:
-    from frf_ipz.frf import FrfSet
+    from frf_ipz.frf import ForceNoise, FrfSet
     from frf_ipz.identification.options import FitOptions
     from frf_ipz.numerics.line_sums import LineSums
 
@@ -92,6 +92,8 @@ class MeasuredLines:
         Power of s that makes each FRF out of a receptance.
     force : (n_frfs,) int array
         Which FRFs share a force, by its number.
+    force_noise : ForceNoise or None
+        The part of the variance that neighbouring lines share, where it is known.
     """
 
     frequency_hz: FloatArray
@@ -102,6 +104,7 @@ class MeasuredLines:
     used: BoolArray
     powers: IntArray
     force: IntArray
+    force_noise: ForceNoise | None = None
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -205,6 +208,7 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
         used=used,
         powers=powers,
         force=np.unique([str(label.input_dof) for label in frfs.labels], return_inverse=True)[1],
+        force_noise=lines.force_noise,
     )
 
 

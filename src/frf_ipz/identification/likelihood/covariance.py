@@ -90,7 +90,9 @@ class FitErrors:
         return np.concatenate([a * real - b * imag, b * real + a * imag])
 
 
-def fit_errors(fit: RefinedPoles, terms: SmoothTerms, level: FloatArray, shift: FloatArray) -> FitErrors:
+def fit_errors(
+    fit: RefinedPoles, terms: SmoothTerms, level: FloatArray, shift: FloatArray, *, pole_factors: FloatArray
+) -> FitErrors:
     """Find where errors of a fit come from.
 
     Parameters
@@ -104,6 +106,8 @@ def fit_errors(fit: RefinedPoles, terms: SmoothTerms, level: FloatArray, shift: 
         common.
     shift : (2 n_poles,) array
         Standard deviation of the same that does not come from noise, rad/s.
+    pole_factors : (2 n_poles,) array
+        Factor on the variance of the poles alone, where lines share a part of the noise.
 
     Returns
     -------
@@ -115,7 +119,7 @@ def fit_errors(fit: RefinedPoles, terms: SmoothTerms, level: FloatArray, shift: 
     return FitErrors(
         system=fit.system,
         terms=terms,
-        pole_root=root * np.sqrt(level + shift**2 / stated)[:, None],
+        pole_root=root * np.sqrt(level * pole_factors + shift**2 / stated)[:, None],
         level=float(np.sqrt(np.median(level))),
         residues=fit.system.scaled_residues(),
     )

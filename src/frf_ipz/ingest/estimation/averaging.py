@@ -11,16 +11,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.frf import FrfLabel, FrfSet
+from frf_ipz.frf import ForceNoise, FrfLabel, FrfSet
 from frf_ipz.ingest.campaign import setup_labels
-from frf_ipz.ingest.estimation.impact_noise import ImpactNoise, add_noise, impact_variance, without_force_noise
+from frf_ipz.ingest.estimation.impact_noise import (
+    ImpactNoise,
+    add_noise,
+    impact_variance,
+    relative_force_noise,
+    without_force_noise,
+)
 from frf_ipz.ingest.estimation.record_table import record_table
 from frf_ipz.ingest.estimation.spectra import SpectrumSums, empty_sums, estimate_coherence, estimate_frf
 from frf_ipz.ingest.estimation.traces import add_traces
 from frf_ipz.ingest.estimation.variance import frf_variance
 from frf_ipz.ingest.frf_estimate import FrfEstimate, Trace
 from frf_ipz.ingest.records import read_records, survey_records
-from frf_ipz.ingest.signals.windows import correlated_lines
+from frf_ipz.ingest.signals.windows import correlated_lines, taper_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -77,6 +83,8 @@ class _LabelEstimate:
     variance: FloatArray
     coherence: FloatArray
     count: int
+    force_noise: ComplexArray | None
+    force: int = 0
 
 
 def average_recordings(
@@ -134,9 +142,10 @@ def _assemble_frfs(
 ) -> FrfSet:
     """Make the FRFs of a test, in the order of its labels."""
     estimates: dict[FrfLabel, _LabelEstimate] = {}
-    for setups, labels in _group_labels(test).items():
+    for number, (setups, labels) in enumerate(_group_labels(test).items()):
         pooled_average = _pool(test, [averages[setup] for setup in setups], setups, labels)
-        estimates |= _estimate(pooled_average, labels, options.estimator)
+        of_labels = _estimate(pooled_average, labels, options.estimator)
+        estimates |= {label: replace(estimate, force=number) for label, estimate in of_labels.items()}
     measured_labels = tuple(label for label in test.labels if label in estimates)
     ordered_estimates = [estimates[label] for label in measured_labels]
     duration = survey.n_samples * survey.step_s
@@ -151,7 +160,33 @@ def _assemble_frfs(
         window_decay_1_s=survey.decay_1_s,
         correlated_lines=correlated_lines(survey.decay_1_s * duration),
         unknown_scale=test.unknown_scale,
+        force_noise=_force_noise(survey, ordered_estimates),
     )
+
+
+def _force_noise(survey: Survey, estimates: Sequence[_LabelEstimate]) -> ForceNoise | None:
+    """Give the noise of forces over the time for which they are kept, half of their windows' tapers included.
+
+    None without windows: then lines have their own.
+    """
+    columns = [estimate.force_noise for estimate in estimates if estimate.force_noise is not None]
+    intervals_s = np.array([_kept_interval_s(record) for record in survey.used])
+    is_cut = any(record.force_interval[1] < record.n_samples for record in survey.used)
+    if len(columns) < len(estimates) or not is_cut:
+        return None
+    start_s, stop_s = np.median(intervals_s, axis=0).tolist()  # all are the same but for double hits
+    return ForceNoise(
+        relative=np.column_stack(columns),
+        force=np.array([estimate.force for estimate in estimates], np.int64),
+        interval_s=(start_s, stop_s),
+    )
+
+
+def _kept_interval_s(record: RecordInfo) -> tuple[float, float]:
+    start, stop = record.force_interval
+    taper = taper_length(start, stop) / 2
+    start_at, stop_at = max(start - taper, 0), min(stop + taper, record.n_samples)
+    return (start_at - record.trigger) * record.step_s, (stop_at - record.trigger) * record.step_s
 
 
 def _group_labels(test: VibrationTest) -> dict[tuple[TestSetup, ...], list[FrfLabel]]:
@@ -185,6 +220,7 @@ def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str)
     sums, noise = average.sums, average.noise
     values = estimate_frf(sums, estimator)
     coherence = estimate_coherence(sums)
+    force_noise = None
     if noise is None:
         variance = frf_variance(sums, average.independent)
     else:
@@ -192,12 +228,14 @@ def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str)
             own_power = without_force_noise(sums, noise)
             values = estimate_frf(replace(sums, force=np.where(own_power > 0.0, own_power, sums.force)))
         variance = impact_variance(sums, noise, values)
+        force_noise = relative_force_noise(sums, noise, values, variance)
     return {
         label: _LabelEstimate(
             values=values[:, column],
             variance=variance[:, column],
             coherence=coherence[:, column],
             count=int(sums.counts[column]),
+            force_noise=None if force_noise is None else force_noise[:, column],
         )
         for column, label in enumerate(labels)
         if sums.counts[column]

@@ -12,7 +12,7 @@ from frf_ipz.ingest.signals.decay import noise_power
 from frf_ipz.ingest.signals.windows import impact_windows
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import FloatArray
+    from frf_ipz.arrays import ComplexArray
     from frf_ipz.ingest.estimation.averaging import SetupAverage
     from frf_ipz.ingest.estimation.impact_noise import ImpactNoise
     from frf_ipz.ingest.frf_estimate import FrfEstimate
@@ -55,13 +55,13 @@ def _add_impact(average: SetupAverage, info: RecordInfo, record: Record, survey:
     average.sums.add(signals[0], signals[1:], rows)
     average.independent[rows] += 1.0
     average.noise = average.noise or empty_noise(survey.n_samples // 2 + 1, len(average.sums.cross))
-    _add_noise(average.noise, info, record, survey, np.abs(np.fft.rfft(signals[0])))
+    _add_noise(average.noise, info, record, survey, np.fft.rfft(signals[0]))
     return float(np.sum(signals[0] ** 2))
 
 
-def _add_noise(noise: ImpactNoise, info: RecordInfo, record: Record, survey: Survey, force: FloatArray) -> None:
-    """Add what is known of the noise of an impact; `force` is the modulus of its force's transform."""
-    rows = list(record.outputs)
+def _add_noise(noise: ImpactNoise, info: RecordInfo, record: Record, survey: Survey, spectrum: ComplexArray) -> None:
+    """Add what is known of the noise of an impact; `spectrum` is that of its force."""
+    rows, force = list(record.outputs), np.abs(spectrum)
     frequency_hz = np.asarray(np.fft.rfftfreq(survey.n_samples, record.step_s))
     rate = survey.decay_1_s * record.step_s
     window, decay = impact_windows(record.n_samples, record.force_interval, rate, record.trigger)
@@ -71,6 +71,7 @@ def _add_noise(noise: ImpactNoise, info: RecordInfo, record: Record, survey: Sur
     noise.force[rows] += noise_power(record.force[record.trigger :], record.step_s, frequency_hz) * np.sum(window**2)
     noise.scales[rows] += scales
     noise.scaled_force[rows] += scales * force**2
+    noise.pulse[rows] += force * spectrum * np.exp(2j * np.pi * frequency_hz * record.trigger * record.step_s)
     if any(info.missing_force):
         missing = force * np.abs(np.fft.rfft(info.missing_force, survey.n_samples))
         first = slice(0, len(info.missing_force) + 1)

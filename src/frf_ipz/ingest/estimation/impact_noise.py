@@ -56,6 +56,8 @@ class ImpactNoise:
         Relative noise powers s.
     missing_force, missing_response : (n_outputs, n_lines) array
         Modulus of the force times that of what its record lacks of it, and of the response.
+    pulse : (n_outputs, n_lines) complex array
+        Transform of the force from its impact on, times its modulus.
     """
 
     response: FloatArray
@@ -64,6 +66,7 @@ class ImpactNoise:
     scales: FloatArray
     missing_force: FloatArray
     missing_response: FloatArray
+    pulse: ComplexArray
 
     def take(self, rows: Sequence[int]) -> ImpactNoise:
         """Take the sums of some responses.
@@ -97,7 +100,9 @@ def empty_noise(n_lines: int, n_outputs: int) -> ImpactNoise:
         Zeros.
     """
     lengths = {field.name: 1 if field.name == "scales" else n_lines for field in fields(ImpactNoise)}
-    return ImpactNoise(**{name: np.zeros((n_outputs, length)) for name, length in lengths.items()})
+    del lengths["pulse"]
+    zeros = {name: np.zeros((n_outputs, length)) for name, length in lengths.items()}
+    return ImpactNoise(**zeros, pulse=np.zeros((n_outputs, n_lines), complex))
 
 
 def add_noise(parts: Sequence[ImpactNoise]) -> ImpactNoise:
@@ -171,6 +176,37 @@ def impact_variance(sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray
         is_recorded = MOST_MISSING * power >= noise.missing_force.T
         is_recorded &= (noise.force.T > 0.0) | (power > LEAST_FORCE * power.max(axis=0))
     return np.asarray(np.where((own_power > 0.0) & _up_to_first_hole(is_recorded), variance, np.nan))
+
+
+def relative_force_noise(
+    sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray, variance: FloatArray
+) -> ComplexArray:
+    """Give the relative error that the noise of the force makes.
+
+    It is the transform of noise that the force window has cut to a short time, over that of the force: lines share it.
+
+    Parameters
+    ----------
+    sums : SpectrumSums
+        Of the impacts.
+    noise : ImpactNoise
+        Theirs.
+    values : (n_lines, n_outputs) complex array
+        The FRFs.
+    variance : (n_lines, n_outputs) array
+        Of the FRFs: the error is no larger than what the noise of the response leaves of it.
+
+    Returns
+    -------
+    (n_lines, n_outputs) complex array
+        Root of mean square, with the phase of one over the force; 0 where the FRF has no variance.
+    """
+    counts, own_power = np.maximum(sums.counts, 1), without_force_noise(sums, noise).T
+    is_known = np.isfinite(variance) & (own_power > 0.0) & (values != 0.0)
+    own_power, gain = np.where(is_known, own_power, 1.0), np.where(is_known, np.abs(values) ** 2, 1.0)
+    by_force, by_response = (power.T / counts * sums.force.T / own_power**2 for power in (noise.force, noise.response))
+    square = np.clip((variance - by_response) / gain, 0.0, by_force)
+    return np.where(is_known, np.sqrt(square) * np.exp(-1j * np.angle(noise.pulse.T)), 0.0)
 
 
 def _up_to_first_hole(is_known: BoolArray) -> BoolArray:
