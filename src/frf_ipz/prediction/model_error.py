@@ -85,7 +85,7 @@ def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEn
     """
     scale = updated.scale
     on_time = replace(fit.model, delay_s=np.zeros_like(fit.model.delay_s))  # a model of the structure is never late
-    measured = on_time(s) / (scale.gains(fit.labels) if scale.is_relative else fit.gain)
+    measured = on_time(s) / (scale.gains(fit.labels) if scale.is_relative else fit.gain * scale.level)
     if updated.expansion is not None:  # a wrong gain is an error of the test
         measured = measured / updated.expansion.wrong_gains_of(fit.labels)
     centre = as_ensemble(updated, ensemble.lowest_rad_s)
@@ -97,7 +97,7 @@ def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEn
     values = {(lines.start, frfs.start): block[0] for lines, frfs, block in centre.receptances(outputs, inputs, s)}
     for lines, frfs, block in ensemble.receptances(outputs, inputs, s):
         factor = s[lines, None] ** powers[frfs]
-        block *= np.stack([scale.drawn(label, len(block)) for label in fit.labels[frfs]], axis=1)[:, None]
+        block *= np.stack([scale.drawn_about_level(label, len(block)) for label in fit.labels[frfs]], axis=1)[:, None]
         block -= block.mean(axis=0)
         parts = block.view(float).reshape(*block.shape, 2)
         spread = np.einsum("mlfp,mlfp->lf", parts, parts) / len(block) * np.abs(factor) ** 2

@@ -7,8 +7,9 @@ targets leave open, taken from the ensemble, whose members have gains of their o
 proportion to the mean amplitude of the FRF, whose size follows from the scatter itself ([Paule1982]).
 
 Where the scale is known, the gain common to all FRFs is fitted all the same: it shows by how much the mass of the model
-is in doubt, which poles and zeros do not tell. The model stays as it is (a slip in the units of the test looks alike);
-the draws of a gain of 1 then reach as far as the one that was found.
+is in doubt, which poles and zeros do not tell. The model stays as it is (a slip in the units of the test looks alike).
+Nothing tells which of the two is wrong, so every other member of the ensemble takes the gain that was found for that of
+the structure: bands reach from the model to it, and hold the truth either way.
 
 ``common``: one factor for all FRFs. ``per_channel``: one for every sensor and one for every excitation. Only products
 of the two show, so the sensors' are 1 in the geometric mean: a point without a sensor is seen by such a mean one.
@@ -24,7 +25,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import BoolArray, FloatArray
 from frf_ipz.frf import FrfLabel
 from frf_ipz.late_imports import import_late
 from frf_ipz.pairing.poles import AMPLITUDE_STD, measured_amplitudes
@@ -60,9 +61,11 @@ class MeasuredScale:
     sign : (n,) array
         1 or -1.
     draws : (m, n) array
-        Of the logarithms: one a member of the update's ensemble.
+        Of the logarithms: one a member of the update's ensemble, all with the errors of the fit.
     level : float
         Measured FRFs over those of the model in their unit, where the test knows its scale; else 1.
+    believes : (m,) bool array
+        Which members take `level` for a property of the structure, the others for a slip of the test.
 
     Examples
     --------
@@ -92,6 +95,7 @@ class MeasuredScale:
     sign: FloatArray = field(default_factory=lambda: np.zeros(0))
     draws: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     level: float = 1.0
+    believes: BoolArray = field(default_factory=lambda: np.zeros(0, bool))
 
     def __repr__(self) -> str:
         return f"MeasuredScale: {self.kind}, {len(self.labels)} FRFs, {len(self.draws)} draws"
@@ -199,6 +203,23 @@ class MeasuredScale:
         (count,) array
             Positive.
         """
+        return np.asarray(np.exp(self._believed(count)) * self.drawn_about_level(label, count))
+
+    def drawn_about_level(self, label: FrfLabel, count: int) -> FloatArray:
+        """Draw the errors of the fitted gain of an FRF.
+
+        Parameters
+        ----------
+        label : FrfLabel
+            Which FRF.
+        count : int
+            Number of draws, one a member of the ensemble.
+
+        Returns
+        -------
+        (count,) array
+            Positive; without what members believe of the level.
+        """
         places = self._places(label)
         if not places:
             return np.ones(count)
@@ -218,7 +239,10 @@ class MeasuredScale:
         list of MeasuredScale
             One a member.
         """
-        return [replace(self, log_gain=self.draws[member]) if self.is_fitted else self for member in range(count)]
+        if not self.is_fitted:
+            return [self] * count
+        gains = self.draws[:count] + self._believed(count)[:, None]
+        return [replace(self, log_gain=log_gain) for log_gain in gains]
 
     def std_db(self, label: FrfLabel) -> float:
         """Give the standard deviation of the gain of an FRF.
@@ -257,6 +281,12 @@ class MeasuredScale:
             f"deviation {width:.2g} dB at most) are fitted; of a prediction the shape is known, and the ratio of its "
             "inputs; its level is that of a mean sensor"
         )
+
+    def _believed(self, count: int) -> FloatArray:
+        """Logarithm of the gain that is due to the structure, as the first members see it."""
+        if not len(self.believes):
+            return np.zeros(count)
+        return np.resize(np.where(self.believes, np.log(self.level), 0.0), count)
 
     def _product(self, places: list[int]) -> float:
         return float(np.prod(self.sign[places]) * np.exp(self.log_gain[places].sum()))
@@ -332,8 +362,9 @@ def fit_scale(
             labels=fit.labels,
             log_gain=np.zeros(1),
             sign=np.ones(1),
-            draws=_doubt(float(log_gain[0]), draws),
+            draws=draws - log_gain,
             level=float(np.exp(log_gain[0])),
+            believes=np.random.default_rng(SEED + 1).permutation(np.arange(len(draws)) % 2 == 1),
         )
     sign = _signs(np.sum((measured * computed).real / np.abs(computed).max(axis=0), axis=0), channels)
     log_gain, draws = _balanced(log_gain, draws, fit.labels, fit.unknown_scale)
@@ -433,11 +464,6 @@ def _unexplained(data: FloatArray, design: FloatArray, known: FloatArray, relati
     while surplus(top) > 0:
         top *= 2.0
     return float(brentq(surplus, floor, top))
-
-
-def _doubt(log_gain: float, draws: FloatArray) -> FloatArray:
-    """Draws about a gain of 1, as far as the one that was found."""
-    return np.asarray(draws - log_gain + log_gain * np.random.default_rng(SEED + 1).standard_normal((len(draws), 1)))
 
 
 def _signs(agreement: FloatArray, channels: FloatArray) -> FloatArray:

@@ -140,8 +140,12 @@ def test_a_known_scale_has_gains_of_one_and_tells_how_far_the_mass_is_in_doubt(c
     assert not scale.is_relative
     assert (scale.gain(label), scale.statement) == (1.0, "")
     assert scale.level == pytest.approx(factor, rel=0.01)
-    drawn = np.log(scale.drawn(label, 200))
-    assert np.sqrt(np.mean(drawn**2)) == pytest.approx(np.log(factor), rel=0.15, abs=0.01)  # of 200 draws
+    drawn, errors = (np.sort(np.log(draw(label, 200))) for draw in (scale.drawn, scale.drawn_about_level))
+    assert np.mean(drawn[:100]) == pytest.approx(0.0, abs=0.02)  # half believe the model, half what is measured
+    assert np.mean(drawn[100:]) == pytest.approx(np.log(factor), abs=0.02)
+    assert np.abs(errors).max() < 0.1
+    gains = [member.gain(label) for member in scale.members(20)]
+    np.testing.assert_allclose(gains, scale.drawn(label, 20))
 
 
 def test_the_band_carries_the_deviation_of_the_gain(common):
