@@ -33,7 +33,7 @@ def correct_settings():
 
 
 def state_damping():
-    """What the page tells the reader to write, after the first diagnosis."""
+    """What the page tells the reader to write."""
     damping = toml_blocks("diagnosis")[0].strip()
     model = Path("beam/model.toml")
     text = model.read_text(encoding="utf-8")
@@ -85,7 +85,8 @@ def test_robust_control_of_the_same_beam(repository):
 def test_diagnosis(repository):
     folder, _ = repository
     with contextlib.chdir(folder):
-        texts = run_page(page("diagnosis"), {0: state_damping})
+        state_damping()
+        texts = run_page(page("diagnosis"))
     assert len(texts) == 3
     for expected, printed in texts:
         assert_same(expected, printed)

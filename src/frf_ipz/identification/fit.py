@@ -19,7 +19,7 @@ from frf_ipz.frf import FrfSet
 from frf_ipz.identification.likelihood.compression import response
 from frf_ipz.identification.likelihood.covariance import FitErrors, fit_errors, value_std
 from frf_ipz.identification.likelihood.refinement import refine_poles
-from frf_ipz.identification.likelihood.sandwich import force_noise_factors
+from frf_ipz.identification.likelihood.sandwich import shared_noise_factors
 from frf_ipz.identification.likelihood.smooth_terms import smooth_terms_of_band
 from frf_ipz.identification.measured_lines import measured_lines, with_misfit_noise
 from frf_ipz.identification.modal_fit import ModalFit
@@ -254,11 +254,12 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
 
 
 def _shared_noise_factors(frfs: FrfSet, fitted: FittedModes) -> FloatArray:
-    """Find the factors on variances of poles by noise of the force, where nothing larger hides it; else 1."""
+    """Find the factors on variances of poles by noise that lines share, where nothing larger hides it; else 1."""
     is_alone = fitted.noise_from == "recordings" and fitted.force_error is None and not of_one_impact(frfs).any()
     if fitted.poles_are_held or not is_alone:
         return np.ones(2 * len(fitted.fit.poles))
-    return force_noise_factors(fitted.lines, fitted.fit, fitted.terms)
+    record_s = 1 / float(np.median(np.diff(frfs.frequency_hz)))
+    return shared_noise_factors(fitted.lines, fitted.fit, fitted.terms, record_s=record_s)
 
 
 def _decisions(fitted: FittedModes, modes: IntArray, unconfirmed: tuple[str, ...]) -> pd.DataFrame:

@@ -5,9 +5,10 @@ The covariance of an optimum is ``I^-1 B I^-1`` with the information I and the c
 whose frequencies waver moves all FRFs at once. Scores of neighbouring lines are added with falling weights
 [Newey1987], and each line's misfit is corrected for its leverage on the coefficients.
 
-Where the noise of the force is known, B is known beforehand: the errors that it makes are the same few samples of noise
-on all lines. They move a sharp peak less than white noise of that size would, and what lies beside the lines that the
-force excites more.
+Where the noise is known, B is known beforehand. The errors that noise of the force makes are the same few samples of
+noise on all lines: they move a sharp peak less than white noise of that size would, and what lies beside the lines that
+the force excites more. An exponential window leaves the first samples of the response's noise, so that neighbouring
+lines are alike: they move a sharp peak more.
 
 [Huber1967] P. J. Huber, The behavior of maximum likelihood estimates under nonstandard conditions, Proc. 5th Berkeley
 Symposium on Mathematical Statistics and Probability 1, 1967, 221-233.
@@ -17,6 +18,7 @@ covariance matrix, Econometrica 55, 1987, 703-708, doi:10.2307/1913610.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
 
 TIMES = 3  # samples of the noise in a period of the highest line: products of two have twice its frequency
 FINER = 8  # places of a grid in the distance of lines whose noise is independent
+ON_GRID = 1e-6  # of a place: what rounding takes from a whole number
 LAGS = (0, 2)  # lines on either side whose scores count as correlated; the larger result is taken
 MAX_LEVERAGE = 0.95  # of a line that the coefficients follow nearly by themselves
 
@@ -71,8 +74,10 @@ def _score_covariance(scores: FloatArray, max_lag: int) -> FloatArray:
     return np.asarray(total)
 
 
-def force_noise_factors(lines: MeasuredLines, fit: RefinedPoles, terms: SmoothTerms) -> FloatArray:
-    """Find the factor on the variance of each pole by noise of the force that lines share.
+def shared_noise_factors(lines: MeasuredLines, fit: RefinedPoles, terms: SmoothTerms, *, record_s: float) -> FloatArray:
+    """Find the factor on the variance of each pole by noise that lines share.
+
+    That of the force lasts as long as the force is kept; that of a response falls with its exponential window.
 
     Parameters
     ----------
@@ -82,57 +87,99 @@ def force_noise_factors(lines: MeasuredLines, fit: RefinedPoles, terms: SmoothTe
         The fit.
     terms : SmoothTerms
         Terms for modes out of band.
+    record_s : float
+        Length of the records, s.
 
     Returns
     -------
     (2 n_poles,) array
-        For all real parts, then all imaginary parts; 1 where no noise of the force is known.
+        For all real parts, then all imaginary parts; 1 where each line has noise of its own.
     """
-    noise, n_lines, n_poles = lines.force_noise, len(lines.s), len(fit.poles)
-    if noise is None or not n_poles:
+    noise, n_poles, decay_1_s = lines.force_noise, len(fit.poles), float(lines.s.real.max())
+    if not n_poles or (noise is None and not decay_1_s):
         return np.ones(2 * n_poles)
     data, residues = lines.weighted(), fit.system.scaled_residues()
-    error = response(fit.system, terms, lines.s) * noise.relative
-    own = np.sqrt(np.tile(np.clip(1 - np.abs(error) ** 2 / lines.variance, 0.0, 1.0), (2, 1)))
-    length_s, middle_s = np.diff(noise.interval_s).item(), np.mean(noise.interval_s)
-    to_grid = _grid(lines.frequency_hz * length_s * FINER)
-    n_times = 2 * int(np.ceil(TIMES / 2 * length_s * lines.frequency_hz[-1])) + 1
-    weighted = data.weight * error * np.exp(-2j * np.pi * lines.frequency_hz * middle_s)[:, None]
+    error = np.zeros_like(lines.receptance) if noise is None else response(fit.system, terms, lines.s) * noise.relative
+    own = data.weight * np.sqrt(np.maximum(lines.variance - np.abs(error) ** 2, 0.0))
+    of_response = _InTime.under_window(lines.frequency_hz, record_s, decay_1_s) if decay_1_s else _on_lines
     covariance = np.zeros((2 * n_poles, 2 * n_poles))
-    in_time: dict[int, FloatArray] = {}
-    for frfs, real, imag, _ in _pole_slopes(data, fit, terms):
-        slopes = np.concatenate([real, imag], axis=1)
+    of_force, shared_samples = None, dict[int, FloatArray]()
+    if noise is not None:
+        of_force = _InTime.within(lines.frequency_hz, noise.interval_s)
+        error = error * np.exp(-2j * np.pi * lines.frequency_hz * np.mean(noise.interval_s))[:, None]
+    for frfs, slopes in _pole_slopes(data, fit, terms):
         for frf in frfs.tolist():
-            part = slopes * own[:, frf, None]
-            a, b = np.diag(residues[frf].real), np.diag(residues[frf].imag)
-            by_parts = np.block([[a, -b], [b, a]])
-            covariance += by_parts.T @ (part.T @ part) @ by_parts
-        real, imag = (by_part[:n_lines] - 1j * by_part[n_lines:] for by_part in (real, imag))
+            samples = of_response(slopes.scores(own[:, [frf]], residues[[frf]]))
+            covariance += samples.T @ samples
+        if noise is None or of_force is None:
+            continue
         for force in np.unique(noise.force[frfs]).tolist():
-            shared = frfs[noise.force[frfs] == force]
-            a, b = (weighted[:, shared] @ part for part in (residues[shared].real, residues[shared].imag))
-            scores = np.concatenate([real * a + imag * b, imag * a - real * b], axis=1)
-            in_time[force] = in_time.get(force, 0.0) + _in_time(to_grid @ scores, n_times)
-    covariance += sum(scores.T @ scores for scores in in_time.values())
+            alike = frfs[noise.force[frfs] == force]
+            samples = of_force(slopes.scores(data.weight[:, alike] * error[:, alike], residues[alike]))
+            shared_samples[force] = shared_samples.get(force, 0.0) + samples
+    covariance += sum(samples.T @ samples for samples in shared_samples.values())
     inverse = np.linalg.pinv(fit.information, hermitian=True)
     return np.asarray(np.einsum("ij,jk,ki->i", inverse, covariance, inverse) / np.diag(inverse))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _InTime:
+    """What each sample of noise adds to scores.
+
+    Parameters
+    ----------
+    to_grid : (n_places, n_lines) sparse array
+        Shares lines out to multiples of one over the time that the transform covers.
+    finer : int
+        That time over the time in which there is noise.
+    std : (n_times,) array
+        Of the noise, from sample to sample; in the mean square 1.
+    """
+
+    to_grid: sparse.csr_array
+    finer: int
+    std: FloatArray
+
+    @classmethod
+    def within(cls, frequency_hz: FloatArray, interval_s: tuple[float, float]) -> _InTime:
+        """White noise in an interval that is much shorter than a record; the middle of it is at zero."""
+        length_s = np.diff(interval_s).item()
+        n_times = _n_times(length_s, frequency_hz)
+        return cls(to_grid=_grid(frequency_hz * length_s * FINER), finer=FINER, std=np.ones(n_times))
+
+    @classmethod
+    def under_window(cls, frequency_hz: FloatArray, record_s: float, decay_1_s: float) -> _InTime:
+        """White noise over a record under an exponential window, which starts at zero."""
+        n_times = _n_times(record_s, frequency_hz)
+        window = np.exp(-decay_1_s * record_s * np.arange(n_times) / n_times)
+        std = window / np.sqrt(np.mean(window**2))
+        return cls(to_grid=_grid(frequency_hz * record_s), finer=1, std=std)
+
+    def __call__(self, scores: ComplexArray) -> FloatArray:
+        """Turn scores on the lines, (n_lines, n), into those of the samples, (n_times, n)."""
+        n_times = len(self.std)
+        spectrum: ComplexArray = np.asarray(self.to_grid @ scores)
+        spectrum[0] *= 2  # counts once, the others and their conjugates twice
+        samples = np.fft.hfft(spectrum, self.finer * n_times, axis=0) / (2 * np.sqrt(n_times))
+        if self.finer > 1:
+            samples = samples[np.arange(-(n_times // 2), n_times // 2 + 1)]
+        return np.asarray(samples * self.std[:, None])
+
+
+def _on_lines(scores: ComplexArray) -> FloatArray:
+    """Scores of noise of its own on each line, as those of samples."""
+    return np.asarray(stacked(scores) / np.sqrt(2.0))
+
+
+def _n_times(length_s: float, frequency_hz: FloatArray) -> int:
+    return 2 * int(np.ceil(TIMES / 2 * length_s * frequency_hz[-1])) + 1
+
+
 def _grid(places: FloatArray) -> sparse.csr_array:
     """Share lines out to the whole numbers beside their places, (n_whole, n_lines)."""
-    low, lines = np.floor(places).astype(int), np.arange(len(places))
+    low, lines = np.floor(places + ON_GRID).astype(int), np.arange(len(places))
     shares = np.concatenate([1 - (places - low), places - low])
     return sparse.csr_array((shares, (np.concatenate([low, low + 1]), np.tile(lines, 2))))
-
-
-def _in_time(spectrum: ComplexArray, n_times: int) -> FloatArray:
-    """Give what each sample of white noise, in a time about zero, adds to scores whose lines are on a grid.
-
-    The grid is so fine that its transform covers the time `FINER` times over.
-    """
-    spectrum[0] *= 2  # counts once, the others and their conjugates twice
-    samples = np.fft.hfft(spectrum, FINER * n_times, axis=0) / (2 * np.sqrt(n_times))
-    return np.asarray(samples[np.arange(-(n_times // 2), n_times // 2 + 1)])
 
 
 def _scores(data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms) -> FloatArray:
@@ -142,21 +189,45 @@ def _scores(data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms) -> Float
     misfit = stacked((data.receptance - response(system, terms, data.s)) * data.weight)
     residues = system.scaled_residues()
     scores = np.zeros((n_lines, 2 * n_poles))
-    for frfs, real, imag, leverage in _pole_slopes(data, fit, terms):
-        corrected = misfit[:, frfs] / np.sqrt(1 - leverage)[:, None]
+    for frfs, slopes in _pole_slopes(data, fit, terms):
+        real, imag = slopes.real, slopes.imag
+        corrected = misfit[:, frfs] / np.sqrt(1 - slopes.leverage)[:, None]
         a, b = corrected @ residues[frfs].real, corrected @ residues[frfs].imag
         by_poles = np.concatenate([real * a + imag * b, imag * a - real * b], axis=1)
         scores += by_poles[:n_lines] + by_poles[n_lines:]
     return scores
 
 
-def _pole_slopes(
-    data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms
-) -> Iterator[tuple[IntArray, FloatArray, FloatArray, FloatArray]]:
-    """Give FRFs with a common basis, slopes by the poles that coefficients cannot follow, and leverages of the lines.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _PoleSlopes:
+    """Slopes by the poles that coefficients cannot follow, for a residue of one.
 
-    Slopes are (2 n_lines, n_poles) arrays, by real and by imaginary part, for a residue of one; leverages (2 n_lines,).
+    Parameters
+    ----------
+    real, imag : (2 n_lines, n_poles) array
+        By real and by imaginary part of the pole.
+    leverage : (2 n_lines,) array
+        Of the coefficients.
     """
+
+    real: FloatArray
+    imag: FloatArray
+    leverage: FloatArray
+
+    def scores(self, weighted: ComplexArray, residues: ComplexArray) -> ComplexArray:
+        """Scores of weighted errors, (n_lines, n_frfs), that are the same but for the phase on each line."""
+        real, imag = (np.conj(_complex(part)) for part in (self.real, self.imag))
+        a, b = weighted @ residues.real, weighted @ residues.imag
+        return np.concatenate([real * a + imag * b, imag * a - real * b], axis=1)
+
+
+def _complex(parts: FloatArray) -> ComplexArray:
+    real, imag = np.split(parts, 2)
+    return np.asarray(real + 1j * imag)
+
+
+def _pole_slopes(data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms) -> Iterator[tuple[IntArray, _PoleSlopes]]:
+    """Give FRFs with a common basis, and their slopes."""
     system = fit.system
     columns = model_columns(data.s, fit.poles, terms, real_modes=system.real_modes, with_slopes=True)
     for number, weight in enumerate([data.profile] if data.is_shared else data.weight.T):
@@ -165,4 +236,5 @@ def _pole_slopes(
         basis = np.linalg.qr(weighted[:, : system.n_linear])[0]
         slopes = weighted[:, system.n_linear :]
         real, imag = np.split(slopes - basis @ (basis.T @ slopes), 2, axis=1)
-        yield frfs, real, imag, np.minimum(np.einsum("ij,ij->i", basis, basis), MAX_LEVERAGE)
+        leverage = np.minimum(np.einsum("ij,ij->i", basis, basis), MAX_LEVERAGE)
+        yield frfs, _PoleSlopes(real=real, imag=imag, leverage=leverage)

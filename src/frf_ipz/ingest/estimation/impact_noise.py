@@ -39,6 +39,7 @@ else:
     special = import_late("scipy.special")
 
 CHANCE = 1e-6  # share of lines without a force that are taken for one with
+SCATTER = 0.05  # share of estimates of a variance that are further above it
 LEAST_FORCE = 1e-5  # of its largest power, 50 dB: a force that was cut to its pulse does not show its own noise
 
 
@@ -184,6 +185,8 @@ def relative_force_noise(
     """Give the relative error that the noise of the force makes.
 
     It is the transform of noise that the force window has cut to a short time, over that of the force: lines share it.
+    A variance that scatters as noise of the measured powers would is split in proportion to these; what goes beyond
+    that is no noise of the force.
 
     Parameters
     ----------
@@ -194,7 +197,7 @@ def relative_force_noise(
     values : (n_lines, n_outputs) complex array
         The FRFs.
     variance : (n_lines, n_outputs) array
-        Of the FRFs: the error is no larger than what the noise of the response leaves of it.
+        Of the FRFs.
 
     Returns
     -------
@@ -205,7 +208,10 @@ def relative_force_noise(
     is_known = np.isfinite(variance) & (own_power > 0.0) & (values != 0.0)
     own_power, gain = np.where(is_known, own_power, 1.0), np.where(is_known, np.abs(values) ** 2, 1.0)
     by_force, by_response = (power.T / counts * sums.force.T / own_power**2 for power in (noise.force, noise.response))
-    square = np.clip((variance - by_response) / gain, 0.0, by_force)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        over_measured = np.where(is_known, variance / (by_force * gain + by_response), 0.0)
+    degrees = 2 * np.maximum(sums.counts - 1, 1)
+    square = by_force * np.minimum(over_measured, special.gammainccinv(degrees / 2, SCATTER) * 2 / degrees)
     return np.where(is_known, np.sqrt(square) * np.exp(-1j * np.angle(noise.pulse.T)), 0.0)
 
 
