@@ -1,5 +1,6 @@
 """Matrices of Nastran and Ansys, from files that came with the libraries that read them, against those programs."""
 
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -12,6 +13,8 @@ from scipy import io, linalg, sparse
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.matrices.nastran_rows import _axes
+from frf_ipz.fe.matrices.registry import read_matrix
+from frf_ipz.fe.matrices.stored import MatrixRequest
 from frf_ipz.fe.model_file import read_model
 
 MASS = np.diag([2.0, 1.0, 3.0])
@@ -111,6 +114,15 @@ def test_dmig_cards_name_their_rows(tmp_path, op4):
     model = read_model(model_toml(tmp_path, ("f.pch", "f.pch"), further=names))
     assert [dof.name for dof in model.dofs] == ["1:x", "2:x", "3:x"]
     assert_allclose(solve_modes(model).natural_frequency_hz, EXPECTED, rtol=1e-8)
+
+
+@pytest.mark.parametrize("point", ["inf", "1.5", "-2"])
+def test_rows_of_dmig_cards_are_whole_numbers(tmp_path, op4, point):
+    del op4
+    text = "$ punched\n" + dmig("KAAX", STIFFNESS)
+    (tmp_path / "f.pch").write_text(text.replace(f"{'DMIG*':8}{'KAAX':16}{1:16}", f"{'DMIG*':8}{'KAAX':16}{point:>16}"))
+    with pytest.raises(FileFormatError, match=f"grid point '?{re.escape(point)}.*whole numbers, the first above 0"):
+        read_matrix(MatrixRequest(path=tmp_path / "f.pch", what="stiffness"))
 
 
 @pytest.mark.parametrize("kind", [1, 2, 3])

@@ -235,6 +235,13 @@ def test_what_is_no_matrix_is_refused_by_name(tmp_path, write, name, words):
         assert word in message
 
 
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, 1.5, -2.0])
+def test_dofs_as_numbers_are_whole_ones(tmp_path, wrong):
+    np.savez(tmp_path / "fem.npz", K=STIFFNESS, M=MASS, dofs=[[1.0, 1.0], [wrong, 1.0], [3.0, 1.0]])
+    with pytest.raises(FileFormatError, match=r"fem\.npz, array 'dofs': has nodes and directions that are no whole"):
+        read_model(model_toml(tmp_path, "fem.npz", "fem.npz", dofs=""))
+
+
 def test_rows_have_to_be_named_somewhere(tmp_path):
     np.savez(tmp_path / "fem.npz", K=STIFFNESS, M=MASS)
     with pytest.raises(FileFormatError, match=r"model\.toml, key 'matrices\.dofs'.*fem\.npz does not say"):

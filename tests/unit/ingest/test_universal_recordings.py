@@ -68,6 +68,8 @@ def test_a_column_that_is_not_there_is_told_with_those_that_are(tmp_path):
     text = message(write(tmp_path, recording(), columns=("force", "acc", "3")))
     assert "has no column 'acc'" in text
     assert "1 ('7:+z', 'Force'), 2 ('1:+z', 'Acceleration'), 3 ('2:+z', 'Acceleration')" in text
+    number = "9" * 5000  # more digits than Python makes a number of
+    assert "has no column '999" in message(write(tmp_path, recording(), columns=("force", number, "3")))
     assert "has no column 'acceleration', or several" in message(
         write(tmp_path, recording(), columns=("force", "acceleration", "3"))
     )

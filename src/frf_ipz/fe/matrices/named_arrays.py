@@ -92,6 +92,9 @@ def _dofs(labels: Any, path: Path) -> tuple[Dof, ...]:  # noqa: ANN401 - an arra
     """Read texts such as ``1:x``, or pairs of node and number of the direction, 1 to 6."""
     items = np.asarray(labels)
     if items.ndim == 2 and items.shape[1] == 2 and items.dtype.kind in "iuf":
+        if not (np.isfinite(items) & (items == np.rint(items))).all() or items[:, 0].min(initial=1) < 1:
+            problem = "has nodes and directions that are no whole numbers from 1; write the DOFs as texts such as '1:x'"
+            raise FileFormatError(path, problem, where="array 'dofs'")
         pairs = [(int(node), int(number)) for node, number in items.tolist()]
         if all(1 <= number <= len(DIRECTIONS) for _, number in pairs):
             return tuple(Dof(node, DIRECTIONS[number - 1]) for node, number in pairs)

@@ -102,7 +102,7 @@ def _find(path: Path, responses: Sequence[UniversalFunction], column: str) -> Un
         found = [function for function in responses if name(function) == column.strip().lower()]
         if len(found) == 1:
             return found[0]
-    if column.isdecimal() and 1 <= int(column) <= len(responses):
+    if column.isdecimal() and 1 <= int(column[:9]) <= len(responses):
         return responses[int(column) - 1]
     known = ", ".join(
         f"{number} ('{_dof(function)}', '{function.ordinate.label}')"

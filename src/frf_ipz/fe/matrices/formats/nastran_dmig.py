@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
@@ -44,11 +45,19 @@ def _read(request: MatrixRequest) -> StoredMatrix:
         values, labels = frame.to_numpy(), frame.index.tolist()
     unbound = MatrixRequest(path=path, what=request.what)
     stored = both_triangles(as_matrix(values, unbound), path)
-    dofs = tuple(
-        Dof(int(node), DIRECTIONS[int(number) - 1] if 1 <= number <= len(DIRECTIONS) else GENERALISED)
-        for node, number in labels
-    )
+    dofs = tuple(_dof(path, *label) for label in labels)
     return StoredMatrix(matrix=stored.matrix, dofs=dofs, notes=stored.notes)
+
+
+def _dof(path: Path, node: Any, number: Any) -> Dof:  # noqa: ANN401 - as pyyeti understood the card
+    numbers = [value for value in (node, number) if isinstance(value, Real) and float(value).is_integer()]
+    if len(numbers) < 2 or node < 1:
+        raise FileFormatError(
+            path,
+            f"names the row of grid point {node!r}, component {number!r}: both must be whole numbers, the first above 0; "
+            "punch it again, or export OUTPUT4",
+        )
+    return Dof(int(node), DIRECTIONS[int(number) - 1] if 1 <= number <= len(DIRECTIONS) else GENERALISED)
 
 
 FORMAT = MatrixFormat(rank=4, fits=_fits, read=_read, names=lambda path: _names_in(read_text(path)))
