@@ -457,7 +457,7 @@ def _unexplained(data: FloatArray, design: FloatArray, known: FloatArray, relati
         return float(np.sum(error**2 / variance) - degrees)
 
     eps = float(np.finfo(float).eps)
-    floor = eps * float(np.max(known) + np.mean(data**2) + eps)  # above 0 where neither noise nor scatter is
+    floor = eps * float(np.median(known + data**2) + eps)  # above 0 where neither noise nor scatter is
     if surplus(floor) <= 0:
         return floor
     top = float(np.sum(data**2) + floor)

@@ -180,8 +180,8 @@ def test_a_point_that_the_model_does_not_know_is_refused():
 @pytest.mark.slow
 def test_bands_cover_the_truth_on_held_back_structures():
     """A slice of the study in frf_testbench/updating/study.py; the whole of it is what is reported."""
-    rows = pd.concat([study_structure(seed, with_ipz=False) for seed in range(700, 712)])
-    assert 0.8 < rows.covered.mean() < 0.97  # 36 FRFs: two standard deviations of the mean are 0.06
+    rows = pd.concat([study_structure(seed, with_ipz=False) for seed in range(712, 736)])
+    assert 0.8 < rows.covered.mean() < 0.97  # 72 FRFs: two standard deviations of the mean are 0.04
     assert rows["minimal-change"].median() < rows.nominal.median() / 8
     assert rows["minimal-change"].median() < rows.trivial.median() / 1.5
     assert (rows["minimal-change"] < rows.nominal).mean() > 0.95

@@ -148,6 +148,15 @@ def test_a_known_scale_has_gains_of_one_and_tells_how_far_the_mass_is_in_doubt(c
     np.testing.assert_allclose(gains, scale.drawn(label, 20))
 
 
+def test_a_mode_that_an_frf_does_not_see_tells_nothing_of_the_gain(common):
+    residues = common.fit.model.residues.copy()
+    residues[0, 0] *= 1e-14  # far below its noise
+    unseen = replace(common.fit, unknown_scale="none", model=replace(common.fit.model, residues=residues))
+    updated = common.updated
+    scale = fit_scale(unseen, common.pairs, updated.model, updated.after, updated.ensemble)
+    assert np.ptp(np.log(scale.drawn_about_level(unseen.labels[1], 200))) < 0.1
+
+
 def test_the_band_carries_the_deviation_of_the_gain(common):
     scale = common.updated.scale
     uncertain = replace(scale, draws=scale.log_gain + np.random.default_rng(0).normal(0.0, 0.5, scale.draws.shape))
