@@ -54,8 +54,8 @@ def _dof(path: Path, node: Any, number: Any) -> Dof:  # noqa: ANN401 - as pyyeti
     if len(numbers) < 2 or node < 1:
         raise FileFormatError(
             path,
-            f"names the row of grid point {node!r}, component {number!r}: both must be whole numbers, the first above 0; "
-            "punch it again, or export OUTPUT4",
+            f"names the row of grid point {node!r}, component {number!r}: both must be whole numbers, the first above "
+            "0; punch it again, or export OUTPUT4",
         )
     return Dof(int(node), DIRECTIONS[int(number) - 1] if 1 <= number <= len(DIRECTIONS) else GENERALISED)
 
