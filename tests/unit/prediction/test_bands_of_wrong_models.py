@@ -9,8 +9,6 @@ import frf_ipz
 from frf_ipz.updating.scale import MeasuredScale
 from hidden_effects import HiddenRun
 
-KINDS = ("cords", "lump", "mass")
-
 
 def share_inside_by_ensemble(run, updated):
     """Share of the lines that the band holds without what the model misses at the measured points."""
@@ -28,6 +26,6 @@ def test_a_band_reaches_as_far_as_the_mass_is_in_doubt():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", [*KINDS, "local modes"])
-def test_bands_hold_the_truth_over_many_machines(kind):
-    assert np.mean([HiddenRun(kind, 5000 + seed).share_inside for seed in range(12)]) > 0.85
+@pytest.mark.parametrize(("kind", "machines"), [("cords", 12), ("lump", 12), ("mass", 12), ("local modes", 6)])
+def test_bands_hold_the_truth_over_many_machines(kind, machines):
+    assert np.mean([HiddenRun(kind, 5000 + seed).share_inside for seed in range(machines)]) > 0.85
