@@ -258,8 +258,8 @@ def _shared_noise_factors(frfs: FrfSet, fitted: FittedModes) -> FloatArray:
     is_alone = fitted.noise_from == "recordings" and fitted.force_error is None and not of_one_impact(frfs).any()
     if fitted.poles_are_held or not is_alone:
         return np.ones(2 * len(fitted.fit.poles))
-    record_s = 1 / float(np.median(np.diff(frfs.frequency_hz)))
-    return shared_noise_factors(fitted.lines, fitted.fit, fitted.terms, record_s=record_s)
+    windowed_s = 1 / float(np.median(np.diff(frfs.frequency_hz))) if frfs.correlated_lines > 1 else 0.0
+    return shared_noise_factors(fitted.lines, fitted.fit, fitted.terms, windowed_s=windowed_s)
 
 
 def _decisions(fitted: FittedModes, modes: IntArray, unconfirmed: tuple[str, ...]) -> pd.DataFrame:

@@ -11,7 +11,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 
-LINES_AT_ONCE = 512  # whose intermediate results stay in the cache
+AT_ONCE = 32768  # lines times poles whose intermediate results stay in the cache: the fastest of 2048 to 65536, nearly
 
 
 def stacked(values: ComplexArray) -> FloatArray:
@@ -85,8 +85,9 @@ def pair_rows(s: ComplexArray, p: ComplexArray, power: int = 1) -> FloatArray:
         For real and imaginary parts of residues; real and imaginary parts of the response.
     """
     rows = np.empty((2, len(p), 2, s.shape[1]))
-    for first in range(0, s.shape[1], LINES_AT_ONCE):
-        part = slice(first, first + LINES_AT_ONCE)
+    n_lines = -(-AT_ONCE // max(len(p), 1))
+    for first in range(0, s.shape[1], n_lines):
+        part = slice(first, first + n_lines)
         _fill_rows(rows[..., part], s[:, part], p, power)
     return rows
 

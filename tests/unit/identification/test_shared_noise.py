@@ -104,7 +104,7 @@ def test_noise_that_is_kept_for_the_whole_record_is_white():
     relative = np.nan_to_num(np.sqrt(frfs.variance) / np.abs(frfs.values)) + 0j
     whole = ForceNoise(relative=relative, force=np.zeros(1, int), interval_s=(0.0, N_SAMPLES / RATE_HZ))
     fitted = find_modes(replace(frfs, force_noise=whole), FitOptions())
-    factors = shared_noise_factors(fitted.lines, fitted.fit, fitted.terms, record_s=N_SAMPLES / RATE_HZ)
+    factors = shared_noise_factors(fitted.lines, fitted.fit, fitted.terms, windowed_s=N_SAMPLES / RATE_HZ)
     np.testing.assert_allclose(factors, 1.0, rtol=0.35, atol=0)  # a peak is four lines wide: they are not many
 
 
@@ -124,7 +124,7 @@ def test_poles_vary_as_samples_of_the_noise_move_them():
         with_sample = replace(data, receptance=modelled + error * wave[:, None])
         moved.append(refine_poles(with_sample, fit.poles, fitted.terms).poles - fit.poles)
     moved = np.concatenate([np.real(moved), np.imag(moved)], axis=1)
-    variance = shared_noise_factors(lines, fit, fitted.terms, record_s=N_SAMPLES / RATE_HZ) * np.diag(
+    variance = shared_noise_factors(lines, fit, fitted.terms, windowed_s=N_SAMPLES / RATE_HZ) * np.diag(
         np.linalg.inv(fit.information)
     )
     np.testing.assert_allclose(variance, np.sum(moved**2, axis=0), rtol=0.05, atol=0)  # the grid of places
@@ -147,7 +147,7 @@ def test_poles_vary_as_noise_under_an_exponential_window_moves_them():
         with_noise = replace(data, receptance=modelled + errors[:, None])
         moved.append(refine_poles(with_noise, fit.poles, fitted.terms).poles - fit.poles)
     moved = np.concatenate([np.real(moved), np.imag(moved)], axis=1)
-    factors = shared_noise_factors(lines, fit, fitted.terms, record_s=N_SAMPLES / RATE_HZ)
+    factors = shared_noise_factors(lines, fit, fitted.terms, windowed_s=N_SAMPLES / RATE_HZ)
     assert factors.max() > 1.2
     variance = factors * np.diag(np.linalg.inv(fit.information))
     np.testing.assert_allclose(variance, np.mean(moved**2, axis=0), rtol=4 * np.sqrt(2 / DRAWS), atol=0)

@@ -74,7 +74,9 @@ def _score_covariance(scores: FloatArray, max_lag: int) -> FloatArray:
     return np.asarray(total)
 
 
-def shared_noise_factors(lines: MeasuredLines, fit: RefinedPoles, terms: SmoothTerms, *, record_s: float) -> FloatArray:
+def shared_noise_factors(
+    lines: MeasuredLines, fit: RefinedPoles, terms: SmoothTerms, *, windowed_s: float
+) -> FloatArray:
     """Find the factor on the variance of each pole by noise that lines share.
 
     That of the force lasts as long as the force is kept; that of a response falls with its exponential window.
@@ -87,21 +89,21 @@ def shared_noise_factors(lines: MeasuredLines, fit: RefinedPoles, terms: SmoothT
         The fit.
     terms : SmoothTerms
         Terms for modes out of band.
-    record_s : float
-        Length of the records, s.
+    windowed_s : float
+        Length of the records whose responses had an exponential window, s; 0 where lines have noise of their own.
 
     Returns
     -------
     (2 n_poles,) array
         For all real parts, then all imaginary parts; 1 where each line has noise of its own.
     """
-    noise, n_poles, decay_1_s = lines.force_noise, len(fit.poles), float(lines.s.real.max())
-    if not n_poles or (noise is None and not decay_1_s):
+    noise, n_poles = lines.force_noise, len(fit.poles)
+    if not n_poles or (noise is None and not windowed_s):
         return np.ones(2 * n_poles)
     data, residues = lines.weighted(), fit.system.scaled_residues()
     error = np.zeros_like(lines.receptance) if noise is None else response(fit.system, terms, lines.s) * noise.relative
     own = data.weight * np.sqrt(np.maximum(lines.variance - np.abs(error) ** 2, 0.0))
-    of_response = _InTime.under_window(lines.frequency_hz, record_s, decay_1_s) if decay_1_s else _on_lines
+    of_response = _InTime.under_window(lines.s, windowed_s) if windowed_s else _on_lines
     covariance = np.zeros((2 * n_poles, 2 * n_poles))
     of_force, shared_samples = None, dict[int, FloatArray]()
     if noise is not None:
@@ -148,8 +150,9 @@ class _InTime:
         return cls(to_grid=_grid(frequency_hz * length_s * FINER), finer=FINER, std=np.ones(n_times))
 
     @classmethod
-    def under_window(cls, frequency_hz: FloatArray, record_s: float, decay_1_s: float) -> _InTime:
+    def under_window(cls, s: ComplexArray, record_s: float) -> _InTime:
         """White noise over a record under an exponential window, which starts at zero."""
+        frequency_hz, decay_1_s = s.imag / (2 * np.pi), float(s.real.max())
         n_times = _n_times(record_s, frequency_hz)
         window = np.exp(-decay_1_s * record_s * np.arange(n_times) / n_times)
         std = window / np.sqrt(np.mean(window**2))

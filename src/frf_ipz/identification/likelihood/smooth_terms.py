@@ -61,9 +61,25 @@ class SmoothTerms:
         (2 n_lines, n_columns) array
             Powers first, then real and imaginary part of each fixed pole's residue in turn.
         """
-        powers = [stacked((s / self.scale_rad_s) ** power)[:, None] for power in self.powers]
-        pairs = [pair_columns(s, pole[None]) for pole in self.poles]
-        return np.concatenate([*powers, *pairs], axis=1)
+        in_turn = np.arange(2 * len(self.poles)).reshape(2, -1).T.ravel()
+        return np.concatenate([stacked(self.powers_of(s)), pair_columns(s, self.poles)[:, in_turn]], axis=1)
+
+    def powers_of(self, s: ComplexArray) -> ComplexArray:
+        """Give the powers of s.
+
+        Parameters
+        ----------
+        s : (n_lines,) complex array
+            rad/s.
+
+        Returns
+        -------
+        (n_lines, n_powers) complex array
+            Of s over `scale_rad_s`.
+        """
+        ratio = s / self.scale_rad_s
+        inverse = 1 / ratio  # a power of -2 takes NumPy many times as long as a square
+        return np.stack([(inverse if power < 0 else ratio) ** abs(power) for power in self.powers], axis=1)
 
     def first(self, n_fixed: int) -> SmoothTerms:
         """Select the first fixed poles.
