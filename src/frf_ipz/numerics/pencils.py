@@ -156,6 +156,31 @@ def generalised_eigh(first: FloatArray, second: FloatArray) -> tuple[FloatArray,
     return values, vectors
 
 
+def modes_of_stack(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Modes of many undamped models at once.
+
+    Parameters
+    ----------
+    mass, stiffness : (..., r, r) array
+        Symmetric; masses positive definite.
+
+    Returns
+    -------
+    squares : (..., r) array
+        Squared natural frequencies, ascending.
+    shapes : (..., r, r) array
+        Columns, mass-normalised.
+
+    Raises
+    ------
+    LinAlgError
+        If a mass matrix is not positive definite.
+    """
+    lower = np.linalg.inv(np.linalg.cholesky(mass))
+    values, vectors = np.linalg.eigh(lower @ stiffness @ lower.swapaxes(-1, -2))
+    return values, lower.swapaxes(-1, -2) @ vectors
+
+
 def undamped_poles(mass: FloatArray, stiffness: FloatArray) -> Roots:
     """Squared natural frequencies of a symmetric pair.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.numerics.damped_modes import receptance_roots, softly_held
+from frf_ipz.numerics.pencils import modes_of_stack
 from frf_ipz.numerics.pole_sums import PoleSums
 
 if TYPE_CHECKING:
@@ -36,10 +37,8 @@ class ModelEnsemble:
     @cached_property
     def modes(self) -> tuple[FloatArray, FloatArray]:
         """Squared natural frequencies (m, r), ascending, and mass-normalised shapes (m, r, r)."""
-        mass, stiffness = self.matrices[:, 0], self.matrices[:, 2]
-        lower = np.linalg.inv(np.linalg.cholesky(mass))
-        values, vectors = np.linalg.eigh(lower @ stiffness @ lower.swapaxes(1, 2))
-        return softly_held(values, self.lowest_rad_s), lower.swapaxes(1, 2) @ vectors
+        squares, shapes = modes_of_stack(self.matrices[:, 0], self.matrices[:, 2])
+        return softly_held(squares, self.lowest_rad_s), shapes
 
     @cached_property
     def roots(self) -> list[tuple[ComplexArray, ComplexArray, ComplexArray]]:

@@ -28,10 +28,11 @@ import numpy as np
 from frf_ipz.arrays import BoolArray, FloatArray
 from frf_ipz.frf import FrfLabel
 from frf_ipz.late_imports import import_late
+from frf_ipz.numerics.pencils import modes_of_stack
 from frf_ipz.pairing.poles import AMPLITUDE_STD, measured_amplitudes
 
 if TYPE_CHECKING:
-    from scipy.optimize import brentq
+    from scipy.optimize import brentq, linear_sum_assignment
 
     from frf_ipz.arrays import ComplexArray
     from frf_ipz.dofs import AnyDof
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from frf_ipz.structure import ReducedModel
 else:
     brentq = import_late("scipy.optimize", "brentq")
+    linear_sum_assignment = import_late("scipy.optimize", "linear_sum_assignment")
 
 SEED = 0  # of the draws: the same bands from the same inputs
 DRAWS = 200  # without an ensemble
@@ -355,6 +357,10 @@ def fit_scale(
     known = fit.gain if fit.unknown_scale == "none" else 1.0
     measured, noise = (values[modes] / np.abs(known) for values in measured_amplitudes(fit))
     computed, spread = _amplitudes(fit.labels, model, np.abs(roots[poles]), ensemble)
+    root_of = np.unique(fit.model.poles[modes], return_inverse=True)[1]
+    together = (root_of == np.arange(root_of.max() + 1)[:, None]).astype(float)  # of modes of one pole the sum is told
+    measured, computed, spread = (together @ values for values in (measured, computed, spread))
+    noise = np.sqrt(together @ noise**2)
     channels = _channels(fit.labels, fit.unknown_scale)
     log_gain, draws = _fit_logs(measured, noise, computed, spread, channels, _independent(fit.labels))
     if fit.unknown_scale == "none":
@@ -387,23 +393,19 @@ def _amplitudes(
     """Amplitudes of modes of a model in the FRFs, (n_modes, n_frfs), and of its members, (m, n_modes, n_frfs)."""
     outputs = np.array([model.row(label.output_dof) for label in labels])
     inputs = np.array([model.row(label.input_dof) for label in labels])
-    squares, shapes = _modes(model.mass[None], model.stiffness[None])
-    frequency = np.sqrt(np.maximum(squares[0], 0.0))
-    chosen = shapes[0][:, [int(np.argmin(np.abs(frequency - value))) for value in omega]]
+    squares, shapes = modes_of_stack(model.mass, model.stiffness)
+    frequency = np.sqrt(np.maximum(squares, 0.0))
+    gaps = np.abs(frequency - omega[:, None])
+    chosen = shapes[:, linear_sum_assignment(gaps)[1]]  # of equal frequencies each its own mode
     computed = (outputs @ chosen) * (inputs @ chosen)
     members = np.zeros((len(ensemble), *computed.T.shape))
     if len(ensemble):
-        _, of_members = _modes(ensemble[:, 0], ensemble[:, 2])
-        likeness = np.abs(chosen.T @ model.mass @ of_members)
-        same = np.take_along_axis(of_members, likeness.argmax(axis=2)[:, None, :], axis=2)
-        members = np.asarray(((outputs @ same) * (inputs @ same)).swapaxes(1, 2))
+        _, of_members = modes_of_stack(ensemble[:, 0], ensemble[:, 2])
+        likeness = (chosen.T @ model.mass @ of_members) ** 2
+        same = np.array([linear_sum_assignment(-values)[1] for values in likeness])
+        chosen_of_members = np.take_along_axis(of_members, same[:, None, :], axis=2)
+        members = np.asarray(((outputs @ chosen_of_members) * (inputs @ chosen_of_members)).swapaxes(1, 2))
     return np.asarray(computed.T), members
-
-
-def _modes(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
-    lower = np.linalg.inv(np.linalg.cholesky(mass))
-    values, vectors = np.linalg.eigh(lower @ stiffness @ lower.swapaxes(1, 2))
-    return values, lower.swapaxes(1, 2) @ vectors
 
 
 def _fit_logs(

@@ -10,6 +10,7 @@ from clamped_beam import BEAM
 from frf_ipz.export.state_space import make_state_space, make_state_space_ensemble, to_control
 from frf_ipz.updating.scale import MeasuredScale, fit_scale
 from frf_testbench.updating.random_structures import draw_stiffness_errors, scale_stiffness
+from frf_testbench.updating.synthetic_fit import make_modal_fit, pair_in_order
 
 LINES = np.arange(5.0, 900.0, 0.5)
 NOISE = 2e-3  # of the root mean square of an FRF
@@ -200,6 +201,50 @@ def test_a_channel_that_roved_has_one_gain(common):
     scale = fit_scale(replace(channels, labels=roved), common.pairs, updated.model, updated.after, updated.ensemble)
     np.testing.assert_allclose(scale.gains(roved), scale.gain(roved[0]), rtol=1e-12)
     assert scale.log_gain.shape == (2,)
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.4, 1.0])
+def test_of_modes_of_one_pole_the_sum_tells_the_gain(turned):
+    """Which two shapes span a repeated root is up to rounding, in the fit and in the model."""
+    rng = np.random.default_rng(4)
+    shapes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    stiffness = (shapes * np.array([4e6, 4e6, 2e7])) @ shapes.T
+    dofs = tuple(frf_ipz.Dof(node, "z") for node in (1, 2, 3))
+    model = frf_ipz.ReducedModel(
+        mass=np.eye(3),
+        damping=np.zeros((3, 3)),
+        stiffness=stiffness,
+        dofs=dofs,
+        expansion=np.eye(3),
+        expanded_dofs=dofs,
+        n_modes=3,
+    )
+    labels = labels_of(["1:z", "2:z", "3:z"], ["1:z", "2:z"])
+    turn = np.array([[np.cos(turned), np.sin(turned), 0], [-np.sin(turned), np.cos(turned), 0], [0, 0, 1]])
+    rows, columns = (
+        np.array([[dof.node - 1 for dof in ends]])
+        for ends in ([label.output_dof for label in labels], [label.input_dof for label in labels])
+    )
+    measured = (shapes @ turn).T
+    poles = np.array([-2 + 2000j, -2 + 2000j, -4 + 4472j])
+    amplitudes = 7.0 * measured[np.arange(3)[:, None], rows] * measured[np.arange(3)[:, None], columns]
+    rational = frf_ipz.PoleResidueModel(
+        poles=poles,
+        residues=amplitudes * (poles**2 / (2j * np.abs(poles)))[:, None],
+        powers=(),
+        coefficients=np.zeros((0, 6)),
+        scale_rad_s=1.0,
+        delay_s=np.zeros(6),
+    )
+    none = np.zeros(0, complex)
+    fit = make_modal_fit(
+        rational, labels, (10.0, 900.0), none, none.real.astype(int), (), np.zeros((6, 6)), np.zeros((3, 6, 2, 2))
+    )
+    fit = replace(fit, unknown_scale="common")
+    pairs = pair_in_order(fit, poles, none)
+    scale = fit_scale(fit, pairs, model, poles, np.zeros((0, 3, 3, 3)))
+    np.testing.assert_allclose(scale.gains(labels), 7.0, rtol=1e-6)
+    assert np.ptp(scale.draws) < 1e-3
 
 
 def test_without_a_pair_the_level_is_that_of_the_model(common):

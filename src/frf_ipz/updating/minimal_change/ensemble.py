@@ -9,6 +9,7 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.late_imports import import_late
+from frf_ipz.numerics.pencils import modes_of_stack
 from frf_ipz.updating.gaussian import draw_posterior
 from frf_ipz.updating.minimal_change.damping import DampingPhase
 from frf_ipz.updating.minimal_change.gauss_newton import Phase, PhaseResult
@@ -135,10 +136,9 @@ def _with_poles(
     mass: FloatArray, stiffness: FloatArray, shapes: FloatArray, squares: FloatArray, n_negative: int
 ) -> FloatArray:
     """Give squared frequencies to the modes most like some shapes; of the rest as many are negative as the model's."""
-    lower = np.linalg.inv(np.linalg.cholesky(mass))
-    values, vectors = np.linalg.eigh(lower @ stiffness @ lower.swapaxes(1, 2))
+    values, vectors = modes_of_stack(mass, stiffness)
     values[:, n_negative:] = np.maximum(values[:, n_negative:], 0.0)
-    sides = mass @ (lower.swapaxes(1, 2) @ vectors)
+    sides = mass @ vectors
     likeness = (shapes.T @ sides) ** 2
     for member in range(len(values)):
         rows, columns = linear_sum_assignment(-likeness[member])

@@ -17,7 +17,7 @@ import numpy as np
 from frf_ipz.dofs import TRANSLATIONS, AnyDof, Dof
 from frf_ipz.late_imports import import_late
 from frf_ipz.updating.expansion import AttachedMass
-from frf_ipz.updating.shape_expansion.random_forces import ModalModel, expand_shape
+from frf_ipz.updating.shape_expansion.random_forces import ModalModel, expand_shape, rows_of_ends
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,9 +34,11 @@ STIFFNESS_STD = 0.05  # of the logarithm: 3 % of a modulus over density, and 2 %
 SHARE_STD = 0.3  # of the mass that a mode has at the place: what is attached is the smaller part
 LIKELY_ERROR, ERROR_STD = 0.1, 1.0  # of the measured amplitudes; median, and std of the logarithm
 STRANGE = 0.05  # probability that a measured mode is none of the model's
-SCATTERS = (0.1, 0.03)  # of the logarithms of frequencies, to start from: what a drawing promises, a good model
-SCATTER_STD = 1.5  # of the logarithm of the scatter, about the last of these
-SWEEPS = 3  # over all unknowns for each start
+LIKELY_SCATTER, SCATTER_STD = 0.03, 1.5  # of the logarithms of frequencies: of a good model; std of its own logarithm
+STARTS = (0.1, 0.03, 0.01)  # scatters to start from: what a drawing promises, a good model, a very good one
+FEW = 0.3  # masses to start from, in their deviation: little is attached
+DIFFERENCE = 1e-5  # of an unknown, of size 1: between rounding and curvature
+EVEN, FLAT = 1e-14, 1e-6  # relative decrease and slope of the evidence where it has converged: what differences tell
 MOST_PLACES = 8
 RIGID = 1e-3  # of the lowest measured frequency: a mode of the model below is one of a rigid body, but for rounding
 STEP = 0.05  # of a logarithm, over which the curvature of the evidence is taken
@@ -115,68 +117,74 @@ def find_attached_masses(model: ReducedModel, measured: MeasuredShapes, places: 
     rows = np.array([model.row(place) for place in places]).reshape(len(places), len(model.mass))
     felt = len(model.mass) / np.einsum("ij,jk,ik->i", rows, np.linalg.inv(model.mass), rows)
     count = len(places)
-    typical = np.concatenate([[0.0], np.zeros(count), np.log([LIKELY_ERROR, SCATTERS[-1]])])
+    typical = np.concatenate([[0.0], np.zeros(count), np.log([LIKELY_ERROR, LIKELY_SCATTER])])
     deviations = np.array([STIFFNESS_STD, *[1.0] * count, ERROR_STD, SCATTER_STD])
+    ends = rows_of_ends(model, measured)
 
     def masses_of(unknowns: FloatArray) -> FloatArray:
-        return np.asarray(SHARE_STD * felt * np.abs(unknowns[1 : 1 + count]))
+        return np.asarray(SHARE_STD * felt * unknowns[..., 1 : 1 + count])
 
-    def loaded(unknowns: FloatArray) -> ReducedModel:
-        added = (rows.T * masses_of(unknowns)) @ rows
-        return replace(model, mass=model.mass + added, stiffness=np.exp(unknowns[0]) * model.stiffness)
+    def loaded(unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        added = (rows.T * masses_of(unknowns)[..., None, :]) @ rows
+        return model.mass + added, np.exp(unknowns[..., 0, None, None]) * model.stiffness
 
-    def cost(unknowns: FloatArray) -> float:
-        modal, (error, scatter) = ModalModel.of(loaded(unknowns), measured), np.exp(unknowns[1 + count :])
-        prior = 0.5 * float(np.sum(((unknowns - typical) / deviations) ** 2))
-        return prior - _log_evidence(modal, measured, float(error), float(scatter))
+    def cost(unknowns: FloatArray) -> FloatArray:
+        modal = ModalModel.of_matrices(*loaded(unknowns), *ends)
+        error, scatter = np.exp(unknowns[..., 1 + count]), np.exp(unknowns[..., 2 + count])
+        prior = 0.5 * np.sum(((unknowns - typical) / deviations) ** 2, axis=-1)
+        return np.asarray(prior - _log_evidence(modal, measured, error, scatter))
 
-    best = typical + np.concatenate([[0.0], np.ones(count), [0.0, 0.0]])
-    for scatter in SCATTERS:
-        start = np.concatenate([best[:-1], [np.log(scatter)]])
-        best = optimize.minimize(cost, start, method="Powell", options={"maxiter": SWEEPS}).x
-    best[1 : 1 + count] = np.abs(best[1 : 1 + count])
+    def with_slope(unknowns: FloatArray) -> tuple[float, FloatArray]:
+        steps = DIFFERENCE * np.eye(len(unknowns))
+        after, before = cost(unknowns + np.stack([steps, -steps]))
+        return float(cost(unknowns)), np.asarray((after - before) / (2 * DIFFERENCE))
+
+    bounds = [(0.0, None) if 1 <= place <= count else (None, None) for place in range(len(typical))]
+    few = typical + np.concatenate([[0.0], np.full(count, FEW), [0.0, 0.0]])
+    starts = [np.concatenate([few[:-1], [np.log(scatter)]]) for scatter in STARTS]
+    optima = [
+        optimize.minimize(
+            with_slope, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": EVEN, "gtol": FLAT}
+        )
+        for start in starts
+    ]
+    best = np.asarray(min(optima, key=lambda optimum: optimum.fun).x)
     std = _deviations(cost, best, deviations)
     low, middle, high = (masses_of(np.maximum(best + width * std, 0.0)) for width in (-Q90, 0.0, Q90))
     masses = [
         AttachedMass(place=place.name, mass_kg=float(mass), low_kg=float(least), high_kg=float(most))
         for place, mass, least, most in zip(places, middle, low, high, strict=True)
     ]
+    mass, stiffness = loaded(best)
     return LoadedModel(
-        model=loaded(best),
+        model=replace(model, mass=mass, stiffness=stiffness),
         stiffness_ratio=float(np.exp(best[0])),
         masses=tuple(masses),
         error=float(np.exp(best[-2])),
     )
 
 
-def _log_evidence(model: ModalModel, measured: MeasuredShapes, error: float, scatter: float) -> float:
-    """Logarithm of the probability of all directions and frequencies."""
+def _log_evidence(model: ModalModel, measured: MeasuredShapes, error: FloatArray, scatter: FloatArray) -> FloatArray:
+    """Logarithm of the probability of all directions and frequencies, (...)."""
     elastic = model.omega > RIGID * measured.omega.min()
-    total = 0.0
+    omega_of_model = np.where(elastic, model.omega, np.inf)
+    total = np.zeros(model.omega.shape[:-1])
     for mode, omega in enumerate(measured.omega):
         shape = expand_shape(model, measured, mode, error)
-        shares = shape.amplitudes**2 / np.sum(shape.amplitudes**2)
-        distance = np.log(omega / model.omega[elastic]) / scatter
-        density = float(shares[elastic] @ np.exp(-0.5 * distance**2)) / scatter
-        total += shape.log_evidence + float(np.log(density + STRANGE))
+        shares = shape.amplitudes**2 / np.sum(shape.amplitudes**2, axis=-1, keepdims=True)
+        distance = np.log(omega_of_model / omega) / scatter[..., None]
+        density = np.sum(shares * np.exp(-0.5 * distance**2), axis=-1) / scatter
+        total += shape.log_evidence + np.log(density + STRANGE)
     return total
 
 
-def _deviations(cost: Callable[[FloatArray], float], best: FloatArray, prior: FloatArray) -> FloatArray:
+def _deviations(cost: Callable[[FloatArray], FloatArray], best: FloatArray, prior: FloatArray) -> FloatArray:
     """Give standard deviations by the curvature; no more than those of the prior."""
-    count = len(best)
-    steps = STEP * np.eye(count)
-    middle = cost(best)
-    hessian = np.zeros((count, count))
-    for row in range(count):
-        for column in range(row + 1):
-            plus, minus = best + steps[row], best - steps[row]
-            if row == column:
-                value = cost(plus) - 2 * middle + cost(minus)
-            else:
-                other = steps[column]
-                value = (cost(plus + other) - cost(plus - other) - cost(minus + other) + cost(minus - other)) / 4
-            hessian[row, column] = hessian[column, row] = value / STEP**2
+    steps = STEP * np.eye(len(best))
+    twice = steps[:, None] + steps  # (n, n, n)
+    apart = steps[:, None] - steps
+    corners = cost(best + np.stack([twice, apart, -apart, -twice]))
+    hessian = (corners[0] - corners[1] - corners[2] + corners[3]) / (2 * STEP) ** 2
     values, vectors = np.linalg.eigh(hessian * np.outer(prior, prior))
     covariance = (vectors / np.maximum(values, 1.0)) @ vectors.T
     return np.asarray(prior * np.sqrt(np.diag(covariance)))

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg
 
 from frf_ipz.arrays import FloatArray
+from frf_ipz.numerics.pencils import modes_of_stack
 
 if TYPE_CHECKING:
     from frf_ipz.structure import ReducedModel
@@ -31,15 +31,15 @@ LEAST_DAMPING = 1e-6  # where none is measured: a mode of the model at the very 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ModalModel:
-    """A reduced model in its modes.
+    """A reduced model in its modes, or many.
 
     Parameters
     ----------
-    omega : (m,) array
+    omega : (..., m) array
         Natural frequencies, ascending, rad/s.
-    shapes : (r, m) array
+    shapes : (..., r, m) array
         Mass-normalised.
-    outputs, inputs : (n_outputs, m), (n_inputs, m) array
+    outputs, inputs : (..., n_outputs, m), (..., n_inputs, m) array
         Shapes at the sensors and at the excited DOFs.
     """
 
@@ -64,31 +64,65 @@ class ModalModel:
         ModalModel
             All of its modes.
         """
-        stiffness = (model.stiffness + model.stiffness.T) / 2
-        squares, shapes = linalg.eigh(stiffness, model.mass)
-        return cls(
-            omega=np.sqrt(np.maximum(squares, 0.0)),
-            shapes=shapes,
-            outputs=np.array([model.row(dof) for dof in measured.outputs]) @ shapes,
-            inputs=np.array([model.row(dof) for dof in measured.inputs]) @ shapes,
-        )
+        return cls.of_matrices(model.mass, model.stiffness, *rows_of_ends(model, measured))
+
+    @classmethod
+    def of_matrices(
+        cls, mass: FloatArray, stiffness: FloatArray, outputs: FloatArray, inputs: FloatArray
+    ) -> ModalModel:
+        """Solve models for their modes.
+
+        Parameters
+        ----------
+        mass, stiffness : (..., r, r) array
+            Of each.
+        outputs, inputs : (n_outputs, r), (n_inputs, r) array
+            Rows of the sensors and excited DOFs.
+
+        Returns
+        -------
+        ModalModel
+            All of their modes.
+        """
+        squares, shapes = modes_of_stack(mass, (stiffness + stiffness.swapaxes(-1, -2)) / 2)
+        omega = np.sqrt(np.maximum(squares, 0.0))
+        return cls(omega=omega, shapes=shapes, outputs=outputs @ shapes, inputs=inputs @ shapes)
+
+
+def rows_of_ends(model: ReducedModel, measured: MeasuredShapes) -> tuple[FloatArray, FloatArray]:
+    """Give the motion of sensors and excited DOFs.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model.
+    measured : MeasuredShapes
+        Names them.
+
+    Returns
+    -------
+    outputs, inputs : (n_outputs, r), (n_inputs, r) array
+        For unit motions of its retained DOFs.
+    """
+    outputs, inputs = (np.array([model.row(dof) for dof in dofs]) for dofs in (measured.outputs, measured.inputs))
+    return outputs, inputs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ExpandedShape:
-    """A measured mode in the modes of a model.
+    """A measured mode in the modes of a model, or of many.
 
     Parameters
     ----------
-    amplitudes : (m,) array
+    amplitudes : (..., m) array
         Of the model's modes, with which shape times shape is the measured amplitude.
-    covariance : (m, m) array
+    covariance : (..., m, m) array
         Of these.
-    at_outputs, at_inputs : (n_outputs,), (n_inputs,) array
+    at_outputs, at_inputs : (..., n_outputs), (..., n_inputs) array
         The measured shape, in the same unit.
-    sign : float
+    sign : (...) array
         1; or -1 where the polarity of the measurement is the opposite of the model's.
-    log_evidence : float
+    log_evidence : (...) array
         Logarithm of the probability of the directions measured, but for a constant.
     """
 
@@ -96,8 +130,8 @@ class ExpandedShape:
     covariance: FloatArray
     at_outputs: FloatArray
     at_inputs: FloatArray
-    sign: float
-    log_evidence: float
+    sign: FloatArray
+    log_evidence: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -106,13 +140,13 @@ class FieldAtPoints:
 
     Parameters
     ----------
-    rows : (n_outputs + n_inputs, m) array
+    rows : (..., n_outputs + n_inputs, m) array
         Shapes of the model there.
-    power : (m,) array
+    power : (..., m) array
         Variance of the amplitude of each of its modes.
-    prior : (n_outputs + n_inputs, n_outputs + n_inputs) array
+    prior : (..., n_outputs + n_inputs, n_outputs + n_inputs) array
         Covariance of the motion.
-    unit_variance : (n_outputs + n_inputs,) array
+    unit_variance : (..., n_outputs + n_inputs) array
         Of an error of 100 % of the typical motion of a side.
     own : (n_outputs + n_inputs,) array
         Relative variance of noise and of doubted points.
@@ -124,20 +158,20 @@ class FieldAtPoints:
     unit_variance: FloatArray
     own: FloatArray
 
-    def error_variance(self, error: float) -> FloatArray:
+    def error_variance(self, error: float | FloatArray) -> FloatArray:
         """Variance of what is measured beside the field.
 
         Parameters
         ----------
-        error : float
+        error : float or (...) array
             Relative, of each measured amplitude beside its noise.
 
         Returns
         -------
-        (n_outputs + n_inputs,) array
+        (..., n_outputs + n_inputs) array
             In the unit of `prior`.
         """
-        return np.asarray(self.unit_variance * (error**2 + self.own))
+        return np.asarray(self.unit_variance * (np.square(error)[..., None] + self.own))
 
 
 def field_at_points(model: ModalModel, measured: MeasuredShapes, mode: int) -> FieldAtPoints:
@@ -157,25 +191,28 @@ def field_at_points(model: ModalModel, measured: MeasuredShapes, mode: int) -> F
     FieldAtPoints
         Before anything is known of its shape.
     """
-    rows = np.vstack([model.outputs, model.inputs])
-    count, n_outputs = len(rows), len(model.outputs)
+    rows = np.concatenate([model.outputs, model.inputs], axis=-2)
+    n_outputs, n_inputs = model.outputs.shape[-2], model.inputs.shape[-2]
     omega, damping = measured.omega[mode], max(float(measured.damping[mode]), LEAST_DAMPING)
     power = 1 / np.abs(model.omega**2 - omega**2 + 2j * damping * model.omega * omega) ** 2
-    power = power / np.mean((rows**2) @ power)
-    prior = (rows * power) @ rows.T
-    sizes = np.diag(prior)
-    unit = [np.full(n_outputs, sizes[:n_outputs].mean()), np.full(count - n_outputs, sizes[n_outputs:].mean())]
+    power = power / np.mean(rows**2 @ power[..., None], axis=-2)
+    prior = (rows * power[..., None, :]) @ rows.swapaxes(-1, -2)
+    sizes = np.diagonal(prior, axis1=-2, axis2=-1)
+    unit = [
+        np.repeat(side.mean(axis=-1, keepdims=True), count, axis=-1)
+        for side, count in ((sizes[..., :n_outputs], n_outputs), (sizes[..., n_outputs:], n_inputs))
+    ]
     return FieldAtPoints(
         rows=rows,
         power=power,
         prior=prior,
-        unit_variance=np.concatenate(unit),
+        unit_variance=np.concatenate(unit, axis=-1),
         own=measured.noise[mode] + measured.doubt,
     )
 
 
-def expand_shape(model: ModalModel, measured: MeasuredShapes, mode: int, error: float) -> ExpandedShape:
-    """Expand a measured mode over a model.
+def expand_shape(model: ModalModel, measured: MeasuredShapes, mode: int, error: float | FloatArray) -> ExpandedShape:
+    """Expand a measured mode over a model, or over many.
 
     Parameters
     ----------
@@ -185,7 +222,7 @@ def expand_shape(model: ModalModel, measured: MeasuredShapes, mode: int, error: 
         Shapes at sensors and excited DOFs.
     mode : int
         Which one.
-    error : float
+    error : float or (...) array
         Relative error of each measured amplitude beside its noise: gains, positions, motion that a sensor sees besides.
 
     Returns
@@ -195,26 +232,28 @@ def expand_shape(model: ModalModel, measured: MeasuredShapes, mode: int, error: 
     """
     field = field_at_points(model, measured, mode)
     rows, power = field.rows, field.power
-    count, n_outputs = len(rows), len(model.outputs)
-    factor = linalg.cho_factor(field.prior + np.diag(field.error_variance(error)), lower=True)
+    count, n_outputs = rows.shape[-2], model.outputs.shape[-2]
+    total = field.prior + field.error_variance(error)[..., None] * np.eye(count)
     output = np.concatenate([measured.at_outputs[mode], np.zeros(count - n_outputs)])
     force = np.concatenate([np.zeros(n_outputs), measured.at_inputs[mode]])
-    by_output, by_force = linalg.cho_solve(factor, output), linalg.cho_solve(factor, force)
+    spread = (rows * power[..., None, :]).swapaxes(-1, -2)
+    sides = np.broadcast_to(np.stack([output, force], axis=-1), (*total.shape[:-1], 2))
+    solved = np.linalg.solve(total, np.concatenate([sides, spread.swapaxes(-1, -2)], axis=-1))
+    by_output, by_force = solved[..., 0], solved[..., 1]
     # sizes of both directions whose product is given: the least forces
-    ratio = float((force @ by_force) / (output @ by_output)) ** 0.25
-    sign = 1.0 if output @ by_force <= 0 else -1.0  # with which the forces are least
+    ratio = (by_force @ force / (by_output @ output))[..., None] ** 0.25
+    sign = np.where(by_force @ output <= 0, 1.0, -1.0)  # with which the forces are least
     root = np.sqrt(measured.size[mode])
-    values = root * (ratio * output + sign * force / ratio)
-    weights = root * (ratio * by_output + sign * by_force / ratio)
-    square, degrees = float(values @ weights), max(count - 1, 1)
-    spread = (rows * power).T
-    left_over = np.diag(power) - spread @ linalg.cho_solve(factor, spread.T)
-    log_determinant = 2 * float(np.log(np.diag(factor[0])).sum())
+    values = root * (ratio * output + sign[..., None] * force / ratio)
+    weights = root * (ratio * by_output + sign[..., None] * by_force / ratio)
+    square, degrees = np.sum(values * weights, axis=-1), max(count - 1, 1)
+    left_over = power[..., None] * np.eye(power.shape[-1]) - spread @ solved[..., 2:]
+    log_determinant = np.linalg.slogdet(total)[1]
     return ExpandedShape(
-        amplitudes=np.asarray(spread @ weights),
-        covariance=np.asarray(left_over * square / degrees),
-        at_outputs=values[:n_outputs],
-        at_inputs=values[n_outputs:],
+        amplitudes=(spread @ weights[..., None])[..., 0],
+        covariance=np.asarray(left_over * square[..., None, None] / degrees),
+        at_outputs=values[..., :n_outputs],
+        at_inputs=values[..., n_outputs:],
         sign=sign,
-        log_evidence=-0.5 * (log_determinant + degrees * np.log(square / measured.size[mode] / degrees)),
+        log_evidence=np.asarray(-0.5 * (log_determinant + degrees * np.log(square / measured.size[mode] / degrees))),
     )

@@ -8,6 +8,7 @@ from scipy import sparse
 
 import frf_ipz
 from frf_ipz.export.state_space import make_state_space
+from frf_ipz.updating.shape_expansion.attached_masses import attachment_places, find_attached_masses
 from frf_ipz.updating.shape_expansion.expanded_model import expand_modes
 from frf_ipz.updating.shape_expansion.left_out_points import ShapeErrors, calibrate, leave_points_out
 from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes
@@ -146,6 +147,19 @@ def test_masses_and_a_split_mode_are_named(expanded):
     assert abs(expanded.expansion.stiffness_ratio - 1) < 0.02
     ((low, high),) = expanded.expansion.split
     assert low < 180.0 < high
+
+
+def test_masses_do_not_hang_on_how_shapes_were_rounded(left_out):
+    fit, reduced_model, *_ = left_out
+    measured = measured_shapes(fit)
+    places = attachment_places(reduced_model, measured, make_nominal().geometry)
+    rounding = 1 + 1e-11 * np.random.default_rng(3).normal(size=measured.at_outputs.shape)
+    rounded = replace(measured, at_outputs=measured.at_outputs * rounding)
+    first, second = (find_attached_masses(reduced_model, shapes, places) for shapes in (measured, rounded))
+    assert len(first.masses) == 5
+    expected = [mass.mass_kg for mass in first.masses]
+    np.testing.assert_allclose([mass.mass_kg for mass in second.masses], expected, rtol=1e-5, atol=1e-7)
+    assert second.stiffness_ratio == pytest.approx(first.stiffness_ratio, abs=1e-6)
 
 
 def test_an_expanded_model_holds_the_measured_modes(left_out, expanded):
