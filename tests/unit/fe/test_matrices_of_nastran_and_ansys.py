@@ -70,6 +70,29 @@ def test_a_matrix_of_output4_is_named(tmp_path, op4):
     assert_allclose(frequencies(path), EXPECTED, rtol=1e-9)
 
 
+def test_a_text_of_output4_whose_column_is_longer_than_the_file_is_refused_at_once(tmp_path, op4):
+    """What reads it would look for so many numbers behind its end."""
+    op4.write(str(tmp_path / "f.op4"), {"A1": STIFFNESS, "A2": MASS}, binary=False)
+    lines = (tmp_path / "f.op4").read_text().splitlines(keepends=True)
+    assert lines[1].split()[0] == "1"
+    lines[1] = f"{lines[1][:16]}99999999\n"
+    (tmp_path / "f.op4").write_text("".join(lines))
+    with pytest.raises(FileFormatError, match="line 2: says that 99999999 numbers follow"):
+        read_model(model_toml(tmp_path, ("f.op4", "f.op4"), "dofs.csv", 'variables = { stiffness = "A1" }\n'))
+
+
+@pytest.mark.parametrize("length", [-48, 16, 2**31 - 1])
+def test_a_record_of_output4_that_leads_astray_is_refused(tmp_path, op4, length):
+    """A negative length would lead back, again and again."""
+    op4.write(str(tmp_path / "f.op4"), {"A1": STIFFNESS, "A2": MASS}, binary=True)
+    content = bytearray((tmp_path / "f.op4").read_bytes())
+    assert int.from_bytes(content[:4], "little") == 24
+    content[32:36] = length.to_bytes(4, "little", signed=True)
+    (tmp_path / "f.op4").write_bytes(bytes(content))
+    with pytest.raises(FileFormatError, match="no record of the length that stands at byte 32"):
+        read_model(model_toml(tmp_path, ("f.op4", "f.op4"), "dofs.csv", 'variables = { stiffness = "A1" }\n'))
+
+
 def test_a_residual_structure_has_the_frequencies_that_nastran_computed(tmp_path, op4, nastran_files):
     """Rows by the USET of the OP2: sets, scalar points, displacement coordinate systems."""
     op2 = library("pyyeti.nastran.op2")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.matrices.stored import (
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 KIND = "an OUTPUT4 file of Nastran"
 MOST_ROWS = 10**7
+LONGEST_HEADER = 48  # bytes of the first record, with integers of eight: longer where bytes stand in the other order
 
 
 def _read(request: MatrixRequest) -> StoredMatrix:
@@ -49,9 +50,38 @@ def _copied(path: Path) -> Iterator[tuple[Any, str]]:
     """Give pyyeti, which takes paths, a copy that is checked and unpacked."""
     op4 = import_reader(path, "pyyeti.nastran.op4", kind=KIND, extra="nastran")
     with TemporaryDirectory() as folder, errors_of_reader(path, KIND):
-        copy = Path(folder) / "matrices.op4"
-        write_bytes(copy, read_bytes(path, most_bytes=MOST_BYTES))
+        copy, content = Path(folder) / "matrices.op4", read_bytes(path, most_bytes=MOST_BYTES)
+        _check_records(path, content) if 0 in content[:4] else _check_counts(path, content)
+        write_bytes(copy, content)
         yield op4, str(copy)
+
+
+def _check_records(path: Path, content: bytes) -> None:
+    """Check that records end where their length says: pyyeti goes by it, and may go back for ever."""
+    order: Literal["little", "big"] = "little" if int.from_bytes(content[:4], "little") <= LONGEST_HEADER else "big"
+    place = 0
+    while place < len(content):
+        end = place + 4 + int.from_bytes(content[place : place + 4], order)
+        if content[place : place + 4] != content[end : end + 4]:
+            raise FileFormatError(path, f"has no record of the length that stands at byte {place}; is it damaged?")
+        place = end + 4
+
+
+def _check_counts(path: Path, content: bytes) -> None:
+    """Check that no column has more numbers than the file: pyyeti reads on where the file has ended."""
+    for number, line in enumerate(content.split(b"\n"), start=1):
+        count = _count(line)
+        if count > len(content):
+            raise FileFormatError(path, f"line {number}: says that {count} numbers follow; is the file damaged?")
+
+
+def _count(line: bytes) -> int:
+    """Numbers that follow a line of column, row and count, or of count and row, each eight wide; 0 after others."""
+    try:
+        first, last = int(line[:8]), line[16:24].strip()
+        return int(last) if last else first
+    except ValueError:
+        return 0
 
 
 def _sizes(path: Path, op4: Any, copy: str) -> list[tuple[str, tuple[int, int]]]:  # noqa: ANN401 - a module
