@@ -15,6 +15,7 @@ import numpy as np
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.matrices.dof_table import DofTable
+from frf_ipz.fe.matrices.fortran_records import check_records
 from frf_ipz.fe.matrices.stored import MOST_BYTES
 from frf_ipz.foreign_errors import errors_of_reader, import_reader
 from frf_ipz.input_files import read_bytes
@@ -55,9 +56,11 @@ def read_uset(path: Path) -> DofTable:
     n2p = import_reader(path, "pyyeti.nastran.n2p", kind=KIND, extra=EXTRA)
     reader = import_reader(path, "pyyeti.nastran." + ("op2" if is_binary else "bulk"), kind=KIND, extra=EXTRA)
     with TemporaryDirectory() as folder, errors_of_reader(path, KIND):  # pyyeti takes paths
-        copy = Path(folder) / path.name
-        write_bytes(copy, read_bytes(path, most_bytes=MOST_BYTES))
-        if not is_binary:
+        copy, content = Path(folder) / path.name, read_bytes(path, most_bytes=MOST_BYTES)
+        write_bytes(copy, content)
+        if is_binary:
+            check_records(path, content)
+        else:
             return _table_of_super_element(copy, path, reader)
         with reader.OP2(str(copy)) as file:
             _require_rows(path, list(file.dbnames))

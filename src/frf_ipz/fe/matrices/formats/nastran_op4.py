@@ -5,9 +5,10 @@ from __future__ import annotations
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from frf_ipz.errors import FileFormatError
+from frf_ipz.fe.matrices.fortran_records import check_records
 from frf_ipz.fe.matrices.stored import (
     MOST_BYTES,
     MatrixFormat,
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
 KIND = "an OUTPUT4 file of Nastran"
 MOST_ROWS = 10**7
-LONGEST_HEADER = 48  # bytes of the first record, with integers of eight: longer where bytes stand in the other order
 
 
 def _read(request: MatrixRequest) -> StoredMatrix:
@@ -51,20 +51,9 @@ def _copied(path: Path) -> Iterator[tuple[Any, str]]:
     op4 = import_reader(path, "pyyeti.nastran.op4", kind=KIND, extra="nastran")
     with TemporaryDirectory() as folder, errors_of_reader(path, KIND):
         copy, content = Path(folder) / "matrices.op4", read_bytes(path, most_bytes=MOST_BYTES)
-        _check_records(path, content) if 0 in content[:4] else _check_counts(path, content)
+        check_records(path, content) if 0 in content[:4] else _check_counts(path, content)
         write_bytes(copy, content)
         yield op4, str(copy)
-
-
-def _check_records(path: Path, content: bytes) -> None:
-    """Check that records end where their length says: pyyeti goes by it, and may go back for ever."""
-    order: Literal["little", "big"] = "little" if int.from_bytes(content[:4], "little") <= LONGEST_HEADER else "big"
-    place = 0
-    while place < len(content):
-        end = place + 4 + int.from_bytes(content[place : place + 4], order)
-        if content[place : place + 4] != content[end : end + 4]:
-            raise FileFormatError(path, f"has no record of the length that stands at byte {place}; is it damaged?")
-        place = end + 4
 
 
 def _check_counts(path: Path, content: bytes) -> None:
