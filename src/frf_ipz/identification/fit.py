@@ -226,9 +226,10 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
     misfit = (lines.receptance - computed) * unit
     misfit_frame = misfit_table(lines.frequency_hz, misfit, np.sqrt(fitted.noise) * unit, frfs.labels)
     model = measured_model(fit.system, terms, lines.powers, order, fitted.delay_s)
+    common = _error_of_force(fitted)
     # what an error of the force is at the poles themselves, residues have followed
-    common = np.zeros(frfs.n_frfs) if fitted.force_error is None else fitted.force_error.rms_of_frfs
-    of_force = common**2 / 2 * np.abs(model.residues[:n_modes]) ** 2
+    at_modes = np.array([np.interp(natural_frequency_hz(fit.poles[modes]), lines.frequency_hz, of) for of in common.T])
+    of_force = at_modes.T**2 / 2 * np.abs(model.residues[:n_modes]) ** 2
     return ModalFit(
         model=model,
         n_modes=n_modes,
@@ -253,9 +254,18 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
     )
 
 
+def _error_of_force(fitted: FittedModes) -> FloatArray:
+    """Give the expected relative error of the force, (n_lines, n_frfs), which residues and fitted FRFs follow."""
+    if fitted.lines.force_noise is not None:
+        return np.asarray(np.abs(fitted.lines.force_noise.relative))
+    rms = 0.0 if fitted.force_error is None else fitted.force_error.rms_of_frfs
+    return np.asarray(rms * np.ones(fitted.lines.receptance.shape))
+
+
 def _shared_noise_factors(frfs: FrfSet, fitted: FittedModes) -> FloatArray:
     """Find the factors on variances of poles by noise that lines share, where nothing larger hides it; else 1."""
-    is_alone = fitted.noise_from == "recordings" and fitted.force_error is None and not of_one_impact(frfs).any()
+    is_alone = fitted.noise_from == "recordings" and not of_one_impact(frfs).any()
+    is_alone &= fitted.force_error is None or fitted.lines.force_noise is not None
     if fitted.poles_are_held or not is_alone:
         return np.ones(2 * len(fitted.fit.poles))
     windowed_s = 1 / float(np.median(np.diff(frfs.frequency_hz))) if frfs.correlated_lines > 1 else 0.0

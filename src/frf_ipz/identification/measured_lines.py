@@ -44,6 +44,8 @@ class WeightedLines:
         Residues of receptances are imaginary, as those of normal modes.
     force : (n_frfs,) int array or None
         Which FRFs share a force, by its number.
+    force_noise : ForceNoise or None
+        What is known of the noise of the force.
     sums : dict
         What the compression has made of the lines, by the powers and the scale of the smooth terms.
     """
@@ -55,6 +57,7 @@ class WeightedLines:
     full: FloatArray | None = None
     real_modes: bool = False
     force: IntArray | None = None
+    force_noise: ForceNoise | None = None
     sums: dict[tuple[tuple[int, ...], float], tuple[LineSums, FloatArray]] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -156,6 +159,7 @@ class MeasuredLines:
             gain=np.exp(gain),
             full=full,
             force=self.force,
+            force_noise=self.force_noise,
         )
 
 

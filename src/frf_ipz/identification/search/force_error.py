@@ -9,6 +9,10 @@ So e is offered as ``sum_k c_k exp(-i omega t_k)`` over the times of a window, w
 c and the window are those of the highest evidence, c itself being integrated out [MacKay1992]. A size of zero is no
 error at all.
 
+Where recordings show the noise of the force beside their pulses, all this is known: e is a few samples of that noise
+over the force, large where the force has a null. What a pole takes off the misfit is then compared with what that noise
+is likely to take off in its place.
+
 [MacKay1992] D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992, 415-447,
 doi:10.1162/neco.1992.4.3.415.
 """
@@ -22,10 +26,11 @@ import numpy as np
 
 from frf_ipz.identification.likelihood.compression import model_columns, response
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
-from frf_ipz.numerics.partial_fractions import unstacked
+from frf_ipz.numerics.partial_fractions import stacked, unstacked
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+    from frf_ipz.frf import ForceNoise
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
     from frf_ipz.identification.measured_lines import WeightedLines
 
@@ -78,7 +83,7 @@ class ForceError:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Evidence:
     evidence: float = 0.0
-    coefficients: ComplexArray = field(default_factory=lambda: np.zeros(0, complex))
+    coefficients: FloatArray = field(default_factory=lambda: np.zeros(0))
     tail: int = 0
     variance: float = 0.0
     gain: float = 0.0
@@ -120,12 +125,14 @@ def find_force_error(
 
 def _error_beside(data: WeightedLines, force: IntArray, fit: RefinedPoles, terms: SmoothTerms) -> ForceError | None:
     """Find the error of each force beside modes and residues that are known but for small changes."""
+    basis = _model_basis(data, fit, terms)
+    if data.force_noise is not None:
+        return _error_of_known_noise(data, data.force_noise, fit, terms, basis)
     modelled = response(fit.system, terms, data.s)
     longest = FINER * max(TAILS)
     first = -int(LEAD * longest)
     step_s = 2 * np.pi / (data.s.imag[-1] - data.s.imag[0]) / FINER
     waves = np.exp(-1j * data.s.imag[:, None] * (step_s * np.arange(first, longest + 1)))
-    basis = _model_basis(data, fit, terms)
     relative = np.zeros(modelled.shape, complex)
     forces = np.unique(force)
     window_s, rms = np.zeros(len(forces)), np.zeros(len(forces))
@@ -138,9 +145,10 @@ def _error_beside(data: WeightedLines, force: IntArray, fit: RefinedPoles, terms
         if not best.tail:
             continue
         used = _part(best.tail)
-        relative[:, of_force] = (waves[:, used] @ best.coefficients)[:, None]
+        real, imag = np.split(best.coefficients, 2)
+        relative[:, of_force] = (waves[:, used] @ (real + 1j * imag))[:, None]
         window_s[number] = best.tail * step_s
-        rms[number] = np.sqrt(2 * best.variance * len(best.coefficients))
+        rms[number] = np.sqrt(best.variance * len(best.coefficients))
         cost += best.gain - best.evidence
     if not rms.any():
         return None
@@ -148,6 +156,95 @@ def _error_beside(data: WeightedLines, force: IntArray, fit: RefinedPoles, terms
         relative=relative,
         force=force,
         window_s=window_s,
+        rms=rms,
+        receptance=data.receptance / (1 + relative),
+        cost=cost,
+    )
+
+
+def share_beyond_known_noise(data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms) -> FloatArray:
+    """Tell how much of what poles take off the misfit remains if the known noise of the force may make it as well.
+
+    A residue's square over its variance, ``c^T W^-1 c``, becomes ``c^T (W + G G^T)^-1 c``, with G what each sample of
+    that noise adds to the residues of the FRFs that share it.
+
+    Parameters
+    ----------
+    data : WeightedLines
+        Lines and weights, the same profile for all FRFs.
+    fit : RefinedPoles
+        A fit to them.
+    terms : SmoothTerms
+        Terms for modes out of band.
+
+    Returns
+    -------
+    (n_poles,) array
+        1 where nothing is known of such noise.
+    """
+    noise, n_poles = data.force_noise, len(fit.poles)
+    if noise is None or not n_poles:
+        return np.ones(n_poles)
+    columns = model_columns(data.s, fit.poles, terms, real_modes=data.real_modes) * np.tile(data.profile, 2)[:, None]
+    length = np.linalg.norm(columns, axis=0)
+    to_residues = np.linalg.pinv(columns / length)[fit.system.n_smooth :]  # real parts of all poles, then imaginary
+    to_residues = to_residues.reshape(-1, n_poles, len(columns)).swapaxes(0, 1)
+    weight = np.linalg.inv(to_residues @ to_residues.swapaxes(1, 2))
+    modelled, waves = response(fit.system, terms, data.s), _waves_of_noise(data, noise)
+    alone, together = np.zeros(n_poles), np.zeros(n_poles)
+    for one in np.unique(noise.force):
+        gram, right = np.eye(waves.shape[1]), np.zeros((n_poles, waves.shape[1], 1))
+        for frf in np.flatnonzero(noise.force == one).tolist():
+            of_line = data.profile * data.gain[frf]
+            by_noise = to_residues @ stacked((of_line * modelled[:, frf] * noise.relative[:, frf])[:, None] * waves)
+            residues = to_residues @ stacked((of_line * data.receptance[:, frf])[:, None])
+            by_noise_weighed = by_noise.swapaxes(1, 2) @ weight
+            gram = gram + by_noise_weighed @ by_noise
+            right += by_noise_weighed @ residues
+            alone += np.sum(residues * (weight @ residues), axis=(1, 2))
+        together -= np.sum(right * np.linalg.solve(gram, right), axis=(1, 2))
+    return np.asarray((alone + together) / np.maximum(alone, np.finfo(float).tiny))
+
+
+def _waves_of_noise(data: WeightedLines, noise: ForceNoise) -> ComplexArray:
+    """Give what samples of noise of the force, one in the mean square together, make of lines, (n_lines, n_samples)."""
+    first_s, last_s = noise.interval_s
+    step_s = 2 * np.pi / (data.s.imag[-1] - data.s.imag[0]) / FINER
+    times = np.linspace(first_s, last_s, 1 + max(int(np.ceil((last_s - first_s) / step_s)), 1))
+    return np.asarray(np.exp(-1j * data.s.imag[:, None] * times) / np.sqrt(len(times)))
+
+
+def _error_of_known_noise(
+    data: WeightedLines, noise: ForceNoise, fit: RefinedPoles, terms: SmoothTerms, basis: ComplexArray
+) -> ForceError | None:
+    """Find the error of each force whose noise is known: its few samples, over the force."""
+    modelled, waves = response(fit.system, terms, data.s), _waves_of_noise(data, noise)
+    n_samples = waves.shape[1]
+    relative = np.zeros(modelled.shape, complex)
+    forces = np.unique(noise.force)
+    rms = np.zeros(len(forces))
+    cost = 0.0
+    for number, one in enumerate(forces):
+        of_force = np.flatnonzero(noise.force == one)
+        weight = data.profile[:, None] * data.gain[of_force]
+        values = modelled[:, of_force] * weight
+        misfit = (data.receptance - modelled)[:, of_force] * weight
+        misfit = misfit - basis @ (basis.conj().T @ misfit).real
+        gram, right = np.zeros((n_samples, n_samples)), np.zeros(n_samples)
+        for size, left in zip((values * noise.relative[:, of_force]).T, misfit.T, strict=True):
+            columns = size[:, None] * waves
+            followed = (basis.conj().T @ columns).real
+            gram += (columns.conj().T @ columns).real - followed.T @ followed
+            right += (columns.conj().T @ left).real
+        found = _evidence(gram, right, np.ones(1))
+        relative[:, of_force] = noise.relative[:, of_force] * (waves @ found.coefficients)[:, None]
+        energy = np.abs(values) ** 2
+        rms[number] = np.sqrt(np.sum(energy * np.abs(noise.relative[:, of_force]) ** 2) / np.sum(energy))
+        cost += found.gain - found.evidence
+    return ForceError(
+        relative=relative,
+        force=noise.force,
+        window_s=np.full(len(forces), noise.interval_s[1]),
         rms=rms,
         receptance=data.receptance / (1 + relative),
         cost=cost,
@@ -191,29 +288,27 @@ def _best_error(
     for tail in (FINER * tail for tail in TAILS):
         used = _part(tail)
         part = np.concatenate([np.arange(used.start, used.stop), len(sides) + np.arange(used.start, used.stop)])
-        found = _evidence(gram[np.ix_(part, part)], right[part], tail)
+        found = replace(_evidence(gram[np.ix_(part, part)], right[part]), tail=tail)
         if found.evidence > max(best.evidence, demanded):
             best = found
     return best
 
 
-def _evidence(gram: FloatArray, right: FloatArray, tail: int) -> _Evidence:
-    """Evidence of the best size, over that of none, and the coefficients expected with it."""
+def _evidence(gram: FloatArray, right: FloatArray, variances: FloatArray | None = None) -> _Evidence:
+    """Evidence of the best size, over that of none, and the real coefficients expected with it."""
     values, vectors = np.linalg.eigh(gram)
     values = np.maximum(values, 0.0)
     if not values[-1] > 0:
-        return _Evidence()
+        return _Evidence(coefficients=np.zeros(len(right)))
     along = vectors.T @ right
-    variances = SIZES[:, None] / values[-1]
-    shrunk = variances / (1 + variances * values)
-    evidence = np.sum(along**2 * shrunk - np.log1p(variances * values), axis=1)
+    tried = (SIZES / values[-1] if variances is None else variances)[:, None]
+    shrunk = tried / (1 + tried * values)
+    evidence = np.sum(along**2 * shrunk - np.log1p(tried * values), axis=1)
     top = int(np.argmax(evidence))
     expected = shrunk[top] * along
-    real, imag = np.split(vectors @ expected, 2)
     return _Evidence(
         evidence=float(evidence[top]),
-        coefficients=real + 1j * imag,
-        tail=tail,
-        variance=float(variances[top, 0]),
+        coefficients=vectors @ expected,
+        variance=float(tried[top, 0]),
         gain=float(np.sum(2 * along * expected - values * expected**2)),
     )

@@ -13,7 +13,7 @@ from frf_ipz.identification.likelihood.compression import response
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
 from frf_ipz.identification.measured_lines import WeightedLines
 from frf_ipz.identification.search.drift import Drift, find_drift
-from frf_ipz.identification.search.force_error import ForceError, find_force_error
+from frf_ipz.identification.search.force_error import ForceError, find_force_error, share_beyond_known_noise
 from frf_ipz.identification.search.goodness_of_fit import (
     GoodnessOfFit,
     assess_fit,
@@ -193,15 +193,19 @@ def _without_force_error(
 ) -> tuple[RefinedPoles, GoodnessOfFit]:
     """Take the error of the force off where poles stand that it could make, and it explains the lines better.
 
-    Where the misfit is more than noise, it is left alone: what a structure does by itself would be taken for it.
+    Where the misfit is more than noise, it is left alone: what a structure does by itself would be taken for it. A pole
+    that the known noise of the force is likely to make goes in any case: beside a null of the force that noise is more
+    than a factor, and part of it stays.
     """
     if not search.noise_is_trusted:
         return fit, goodness
-    doubts = _doubts(search, fit, goodness)
+    beyond_noise = goodness.drops * share_beyond_known_noise(search.data, fit, search.terms)[:, None]
+    is_noise = (over_bic(beyond_noise, 2 * len(search.data.s)) < 1) & ~_is_pinned(search, fit.poles)
+    doubts = np.where(is_noise, np.inf, _doubts(search, fit, goodness))
     # on lines where the model does not follow to the noise, its level takes the place of the noise: one for all FRFs
     level = np.exp(np.log(goodness.level).mean(axis=1))
     weighed = replace(search.data, profile=search.data.profile / np.sqrt(level))
-    found = _error_beside_best_poles(search, weighed, fit, goodness, doubts)
+    found = _error_beside_best_poles(search, weighed, fit, goodness, doubts)  # without what is noise
     if found is None:
         return fit, goodness
     error, beside = found
@@ -209,7 +213,7 @@ def _without_force_error(
         search,
         data=replace(search.data, receptance=error.receptance),
         force_error=error,
-        refused=[],
+        refused=fit.poles[is_noise].tolist(),
         decisions=list(search.decisions),
     )
     other = refine_poles(corrected.data, beside.poles, search.terms, iterations=ROUGH_ITERATIONS)
@@ -217,7 +221,7 @@ def _without_force_error(
     n_numbers = 2 * len(level)
     before = _misfit(search, weighed, fit) + np.sum(demanded_by_bic(goodness, n_numbers))
     after = _misfit(corrected, weighed, other) + np.sum(demanded_by_bic(other_goodness, n_numbers)) + error.cost
-    if after > before:
+    if after > before and not is_noise.any():
         return fit, goodness
     gone, _, _ = _added_poles(other.poles, fit.poles)
     corrected.record(gone, "dropped", [FORCE_REASON] * len(gone))
@@ -236,7 +240,7 @@ def _error_beside_best_poles(
     order = np.argsort(doubts)
     demanded = demanded_by_bic(goodness, 2 * len(weighed.s))
     best, least, last = None, np.inf, 0
-    for count in range(len(order) - n_doubtful, len(order) + 1):
+    for count in range(len(order) - n_doubtful, len(order) + 1 - int(np.isinf(doubts).sum())):
         chosen = order[:count]
         some = refine_poles(search.data, fit.poles[chosen], search.terms, iterations=ROUGH_ITERATIONS)
         some = refine_poles(weighed, some.poles, search.terms, iterations=0)
