@@ -143,6 +143,8 @@ class Elements:
         used = rows[:n_entries].astype(np.int64)
         if len(used) < n_entries or (used < 0).any() or (used >= dimensions[0]).any():
             raise DamagedError("an entry of a sparse matrix lies outside it")
+        if is_logical and n_parts > 1:
+            raise DamagedError("a sparse matrix is logical and complex")
         if is_logical:  # of one byte each, whatever the type says
             if self.take(DTYPES.keys())[2] < n_entries:
                 raise DamagedError("entries of a sparse matrix are missing")

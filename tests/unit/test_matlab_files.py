@@ -142,8 +142,9 @@ def test_a_blank_needs_no_letter_and_many_blanks_do(tmp_path):
         matrix(
             0x205, element(5, bytes(12)), element(5, struct.pack("<2i", 0, 3)), element(9, b"\1"), dimensions=(3, 1)
         ),
+        matrix(0xA05, element(5, bytes(4)), element(5, struct.pack("<2i", 0, 1)), element(9, b"\1"), dimensions=(1, 1)),
     ],
-    ids=["negative dimensions", "logical entries missing"],
+    ids=["negative dimensions", "logical entries missing", "logical, sparse and complex"],
 )
 def test_what_no_program_writes_is_refused(tmp_path, body):
     path = tmp_path / "a.mat"

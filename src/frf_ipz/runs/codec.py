@@ -19,6 +19,7 @@ from scipy import sparse
 
 from frf_ipz.errors import FileFormatError, FrfIpzError
 from frf_ipz.late_imports import import_late
+from frf_ipz.numerics.compressed_places import require_places
 from frf_ipz.runs.stage_file import ADVICE, StageFile, read_stage_file, write_stage_file
 
 if TYPE_CHECKING:
@@ -208,7 +209,7 @@ class _Sparse(_Kind):
         if n_rows != n_columns:
             raise _MisfitError("a square matrix was expected")
         matrix = sparse.csr_array((data, indices, pointers), shape=(n_rows, n_columns))
-        matrix.check_format(full_check=True)  # an index beyond its end would be followed
+        require_places(matrix)  # an index beyond its end would be followed
         return matrix
 
 

@@ -196,6 +196,7 @@ def test_a_field_that_is_not_what_its_annotation_says_is_damage(tmp_path, change
         ([{"array": 0}, {"array": 0}], [np.zeros(2)]),
         ({"csr": [{"array": 0}, {"array": 1}, {"array": 2}], "shape": [2, 2]}, [np.ones(2), [0, 9**9], [0, 1, 2]]),
         ({"csr": [{"array": 0}, {"array": 1}, {"array": 2}], "shape": [2, 2]}, [np.ones(2), [0, 1], [0, 1, 9**9]]),
+        ({"csr": [{"array": 0}, {"array": 1}, {"array": 2}], "shape": [2, 2]}, [np.ones(2), [0, 1], [0, 9**9, 0]]),
         ({"csr": [{"array": 0}, {"array": 1}, {"array": 2}], "shape": [1, 2**40]}, [np.ones(1), [0], [0, 1]]),
         ({"frame": [["a", {"array": 0}]], "rows": 3}, [np.zeros(2)]),
         ({"frame": [["a", {"array": 0}]], "rows": 2}, [np.zeros((2, 2))]),
@@ -203,7 +204,10 @@ def test_a_field_that_is_not_what_its_annotation_says_is_damage(tmp_path, change
         ({"unknown": 1}, []),
         ({}, []),
     ],
-    ids=["no array", "one twice", "indices", "pointers", "not square", "rows", "axes", "no columns", "tag", "nothing"],
+    ids=[
+        *("no array", "one twice", "indices", "pointers", "pointers that end at none", "not square"),
+        *("rows", "axes", "no columns", "tag", "nothing"),
+    ],
 )
 def test_arrays_and_tables_that_do_not_fit_are_damage(tmp_path, tree, arrays):
     path = tmp_path / "evil.result"

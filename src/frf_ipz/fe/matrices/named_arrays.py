@@ -10,6 +10,7 @@ from scipy import sparse
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError
 from frf_ipz.fe.matrices.stored import MatrixRequest, StoredMatrix, as_matrix, both_triangles, positions_of_rows
+from frf_ipz.numerics.compressed_places import require_places
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -82,7 +83,7 @@ def _sparse_of_parts(parts: tuple[str, tuple[int, ...], Mapping[str, Any]], path
     elif kind in COMPRESSED:
         indices, pointers = (np.asarray(arrays[name], np.int64) for name in ("indices", "indptr"))
         matrix = COMPRESSED[kind]((arrays["data"], indices, pointers), shape=shape)
-        matrix.check_format(full_check=True)
+        require_places(matrix)
     else:
         raise FileFormatError(path, f"holds a sparse matrix in the format '{kind}'; save it as csr, csc or coo")
     return sparse.csr_array(matrix)

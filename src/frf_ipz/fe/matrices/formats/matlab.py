@@ -14,6 +14,7 @@ from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.hdf5_files import SIGNATURE, Hdf5Tree, open_tree
 from frf_ipz.input_files import open_input
 from frf_ipz.matlab_files import read_matlab
+from frf_ipz.numerics.compressed_places import require_places
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -93,5 +94,5 @@ def _sparse(tree: Hdf5Tree, group: Any) -> Any:  # noqa: ANN401
     values = tree.read(group["data"]).ravel()
     rows = np.asarray(tree.read(group["ir"]), np.int64).ravel()
     matrix: Any = sparse.csc_array((values, rows, columns), shape=(n_rows, len(columns) - 1))
-    matrix.check_format(full_check=True)
+    require_places(matrix)
     return sparse.csr_array(matrix)
