@@ -19,7 +19,6 @@ from scipy import sparse
 
 from frf_ipz.errors import FileFormatError, FrfIpzError
 from frf_ipz.late_imports import import_late
-from frf_ipz.numerics.compressed_places import require_places
 from frf_ipz.runs.stage_file import ADVICE, StageFile, read_stage_file, write_stage_file
 
 if TYPE_CHECKING:
@@ -27,8 +26,11 @@ if TYPE_CHECKING:
 
     import pandas as pd
     from numpy.typing import NDArray
+
+    from frf_ipz.numerics.compressed_places import require_places
 else:
     pd = import_late("pandas")
+    require_places = import_late("frf_ipz.numerics.compressed_places", "require_places")
 
 RESULTS = {  # by stage: the whole list of what is ever built from a file, with the types of its fields
     "ingest": "frf_ipz.ingest.frf_estimate:FrfEstimate",
