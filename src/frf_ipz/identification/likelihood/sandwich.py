@@ -103,11 +103,11 @@ def shared_noise_factors(
     data, residues = lines.weighted(), fit.system.scaled_residues()
     error = np.zeros_like(lines.receptance) if noise is None else response(fit.system, terms, lines.s) * noise.relative
     own = data.weight * np.sqrt(np.maximum(lines.variance - np.abs(error) ** 2, 0.0))
-    of_response = _InTime.under_window(lines.s, windowed_s) if windowed_s else _on_lines
+    of_response = NoiseInTime.under_window(lines.s, windowed_s) if windowed_s else _on_lines
     covariance = np.zeros((2 * n_poles, 2 * n_poles))
     of_force, shared_samples = None, dict[int, FloatArray]()
     if noise is not None:
-        of_force = _InTime.within(lines.frequency_hz, noise.interval_s)
+        of_force = NoiseInTime.within(lines.frequency_hz, noise.interval_s)
         error = error * np.exp(-2j * np.pi * lines.frequency_hz * np.mean(noise.interval_s))[:, None]
     for frfs, slopes in _pole_slopes(data, fit, terms):
         for frf in frfs.tolist():
@@ -125,8 +125,8 @@ def shared_noise_factors(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _InTime:
-    """What each sample of noise adds to scores.
+class NoiseInTime:
+    """What each sample of noise adds to sums over lines.
 
     Parameters
     ----------
@@ -143,15 +143,41 @@ class _InTime:
     std: FloatArray
 
     @classmethod
-    def within(cls, frequency_hz: FloatArray, interval_s: tuple[float, float]) -> _InTime:
-        """White noise in an interval that is much shorter than a record; the middle of it is at zero."""
+    def within(cls, frequency_hz: FloatArray, interval_s: tuple[float, float]) -> NoiseInTime:
+        """Describe white noise in an interval that is much shorter than a record.
+
+        Parameters
+        ----------
+        frequency_hz : (n_lines,) array
+            Lines, Hz.
+        interval_s : pair of float
+            First and last time; the middle counts as zero.
+
+        Returns
+        -------
+        NoiseInTime
+            Of one in the mean square on each line.
+        """
         length_s = np.diff(interval_s).item()
         n_times = _n_times(length_s, frequency_hz)
         return cls(to_grid=_grid(frequency_hz * length_s * FINER), finer=FINER, std=np.ones(n_times))
 
     @classmethod
-    def under_window(cls, s: ComplexArray, record_s: float) -> _InTime:
-        """White noise over a record under an exponential window, which starts at zero."""
+    def under_window(cls, s: ComplexArray, record_s: float) -> NoiseInTime:
+        """Describe white noise over a record under an exponential window, which starts at zero.
+
+        Parameters
+        ----------
+        s : (n_lines,) complex array
+            Lines, rad/s; the real part is the decay of the window.
+        record_s : float
+            Length of the record, s.
+
+        Returns
+        -------
+        NoiseInTime
+            Of one in the mean square on each line.
+        """
         frequency_hz, decay_1_s = s.imag / (2 * np.pi), float(s.real.max())
         n_times = _n_times(record_s, frequency_hz)
         window = np.exp(-decay_1_s * record_s * np.arange(n_times) / n_times)
@@ -159,7 +185,18 @@ class _InTime:
         return cls(to_grid=_grid(frequency_hz * record_s), finer=1, std=std)
 
     def __call__(self, scores: ComplexArray) -> FloatArray:
-        """Turn scores on the lines, (n_lines, n), into those of the samples, (n_times, n)."""
+        """Turn sums over lines into those over samples.
+
+        Parameters
+        ----------
+        scores : (n_lines, n) complex array
+            What each line would add to a sum.
+
+        Returns
+        -------
+        (n_times, n) array
+            What each sample adds; a sum's variance is that of its squares.
+        """
         n_times = len(self.std)
         spectrum: ComplexArray = np.asarray(self.to_grid @ scores)
         spectrum[0] *= 2  # counts once, the others and their conjugates twice

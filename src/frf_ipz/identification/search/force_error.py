@@ -26,7 +26,8 @@ import numpy as np
 
 from frf_ipz.identification.likelihood.compression import model_columns, response
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
-from frf_ipz.numerics.partial_fractions import stacked, unstacked
+from frf_ipz.identification.likelihood.sandwich import NoiseInTime
+from frf_ipz.numerics.partial_fractions import unstacked
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
@@ -44,6 +45,7 @@ FEWEST_FRFS = 2  # of an excitation: a factor of a single one takes the place of
 MOST_FRFS = 8  # of an excitation, those that weigh most: all have the same error, and few tell it as well
 ROUNDS = 4  # of finding the error, and the modes without it
 ITERATIONS = 4  # of poles, in a round
+LINES_AT_ONCE = 4096  # whose waves are in memory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -186,40 +188,41 @@ def share_beyond_known_noise(data: WeightedLines, fit: RefinedPoles, terms: Smoo
     if noise is None or not n_poles:
         return np.ones(n_poles)
     columns = model_columns(data.s, fit.poles, terms, real_modes=data.real_modes) * np.tile(data.profile, 2)[:, None]
-    length = np.linalg.norm(columns, axis=0)
-    to_residues = np.linalg.pinv(columns / length)[fit.system.n_smooth :]  # real parts of all poles, then imaginary
-    to_residues = to_residues.reshape(-1, n_poles, len(columns)).swapaxes(0, 1)
-    weight = np.linalg.inv(to_residues @ to_residues.swapaxes(1, 2))
-    modelled, waves = response(fit.system, terms, data.s), _waves_of_noise(data, noise)
-    alone, together = np.zeros(n_poles), np.zeros(n_poles)
+    basis, triangle = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))
+    of_residues = np.linalg.pinv(triangle)[fit.system.n_smooth :]  # real parts of all poles, then imaginary
+    to_residues = unstacked(basis @ of_residues.T)
+    weight = np.linalg.inv(_by_pole(of_residues, n_poles) @ _by_pole(of_residues, n_poles).swapaxes(1, 2))
+    frequency_hz, middle_s = data.s.imag / (2 * np.pi), float(np.mean(noise.interval_s))
+    in_time = NoiseInTime.within(frequency_hz, noise.interval_s)
+    error = response(fit.system, terms, data.s) * noise.relative * np.exp(-1j * data.s.imag * middle_s)[:, None]
+    alone, explained = np.zeros(n_poles), np.zeros(n_poles)
     for one in np.unique(noise.force):
-        gram, right = np.eye(waves.shape[1]), np.zeros((n_poles, waves.shape[1], 1))
+        gram, right = np.zeros((n_poles, 1, 1)), np.zeros((n_poles, 1, 1))
         for frf in np.flatnonzero(noise.force == one).tolist():
             of_line = data.profile * data.gain[frf]
-            by_noise = to_residues @ stacked((of_line * modelled[:, frf] * noise.relative[:, frf])[:, None] * waves)
-            residues = to_residues @ stacked((of_line * data.receptance[:, frf])[:, None])
-            by_noise_weighed = by_noise.swapaxes(1, 2) @ weight
-            gram = gram + by_noise_weighed @ by_noise
-            right += by_noise_weighed @ residues
+            by_noise = _by_pole(in_time(to_residues.conj() * (of_line * error[:, frf])[:, None]).T, n_poles)
+            residues = _by_pole((to_residues.conj().T @ (of_line * data.receptance[:, frf])).real[:, None], n_poles)
+            weighed = by_noise.swapaxes(1, 2) @ weight
+            gram = gram + weighed @ by_noise
+            right = right + weighed @ residues
             alone += np.sum(residues * (weight @ residues), axis=(1, 2))
-        together -= np.sum(right * np.linalg.solve(gram, right), axis=(1, 2))
-    return np.asarray((alone + together) / np.maximum(alone, np.finfo(float).tiny))
+        explained += np.sum(right * np.linalg.solve(gram + np.eye(gram.shape[1]), right), axis=(1, 2))
+    return np.asarray(1 - explained / np.maximum(alone, np.finfo(float).tiny))
 
 
-def _waves_of_noise(data: WeightedLines, noise: ForceNoise) -> ComplexArray:
-    """Give what samples of noise of the force, one in the mean square together, make of lines, (n_lines, n_samples)."""
-    first_s, last_s = noise.interval_s
-    step_s = 2 * np.pi / (data.s.imag[-1] - data.s.imag[0]) / FINER
-    times = np.linspace(first_s, last_s, 1 + max(int(np.ceil((last_s - first_s) / step_s)), 1))
-    return np.asarray(np.exp(-1j * data.s.imag[:, None] * times) / np.sqrt(len(times)))
+def _by_pole(rows: FloatArray, n_poles: int) -> FloatArray:
+    """Put rows of real parts of all poles, then of imaginary parts, side by side, (n_poles, 1 or 2, n)."""
+    return rows.reshape(-1, n_poles, rows.shape[1]).swapaxes(0, 1)
 
 
 def _error_of_known_noise(
     data: WeightedLines, noise: ForceNoise, fit: RefinedPoles, terms: SmoothTerms, basis: ComplexArray
 ) -> ForceError | None:
     """Find the error of each force whose noise is known: its few samples, over the force."""
-    modelled, waves = response(fit.system, terms, data.s), _waves_of_noise(data, noise)
-    n_samples = waves.shape[1]
+    modelled = response(fit.system, terms, data.s)
+    first_s, last_s = noise.interval_s
+    step_s = 2 * np.pi / (data.s.imag[-1] - data.s.imag[0]) / FINER
+    times = np.linspace(first_s, last_s, 1 + max(int(np.ceil((last_s - first_s) / step_s)), 1))
     relative = np.zeros(modelled.shape, complex)
     forces = np.unique(noise.force)
     rms = np.zeros(len(forces))
@@ -230,25 +233,39 @@ def _error_of_known_noise(
         values = modelled[:, of_force] * weight
         misfit = (data.receptance - modelled)[:, of_force] * weight
         misfit = misfit - basis @ (basis.conj().T @ misfit).real
-        gram, right = np.zeros((n_samples, n_samples)), np.zeros(n_samples)
-        for size, left in zip((values * noise.relative[:, of_force]).T, misfit.T, strict=True):
-            columns = size[:, None] * waves
-            followed = (basis.conj().T @ columns).real
-            gram += (columns.conj().T @ columns).real - followed.T @ followed
-            right += (columns.conj().T @ left).real
+        sizes = (
+            values * noise.relative[:, of_force] / np.sqrt(len(times))
+        )  # of samples, one in the mean square together
+        gram, right = np.zeros((len(times), len(times))), np.zeros(len(times))
+        followed = np.zeros((len(of_force), basis.shape[1], len(times)))
+        for some in _blocks_of(len(data.s)):
+            waves = np.exp(-1j * data.s.imag[some, None] * times)
+            power = np.sum(np.abs(sizes[some]) ** 2, axis=1)[:, None]
+            gram += (waves.conj().T @ (power * waves)).real
+            right += (waves.conj().T @ np.sum(sizes[some].conj() * misfit[some], axis=1)).real
+            for number_of_frf, size in enumerate(sizes[some].T):
+                followed[number_of_frf] += (basis[some].conj().T @ (size[:, None] * waves)).real
+        gram -= np.einsum("kij,kil->jl", followed, followed)
         found = _evidence(gram, right, np.ones(1))
-        relative[:, of_force] = noise.relative[:, of_force] * (waves @ found.coefficients)[:, None]
+        samples = found.coefficients / np.sqrt(len(times))
+        blocks = [np.exp(-1j * data.s.imag[some, None] * times) @ samples for some in _blocks_of(len(data.s))]
+        relative[:, of_force] = noise.relative[:, of_force] * np.concatenate(blocks)[:, None]
         energy = np.abs(values) ** 2
         rms[number] = np.sqrt(np.sum(energy * np.abs(noise.relative[:, of_force]) ** 2) / np.sum(energy))
         cost += found.gain - found.evidence
     return ForceError(
         relative=relative,
         force=noise.force,
-        window_s=np.full(len(forces), noise.interval_s[1]),
+        window_s=np.full(len(forces), last_s),
         rms=rms,
         receptance=data.receptance / (1 + relative),
         cost=cost,
     )
+
+
+def _blocks_of(n_lines: int) -> list[slice]:
+    """Cut lines into blocks, in which waves take little memory."""
+    return [slice(start, start + LINES_AT_ONCE) for start in range(0, n_lines, LINES_AT_ONCE)]
 
 
 def _part(tail: int) -> slice:
