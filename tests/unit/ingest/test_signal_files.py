@@ -168,6 +168,19 @@ def test_a_formula_of_an_mdf_file_is_not_run(tmp_path):
         look_at_recording(tmp_path / "a.mf4")
 
 
+@pytest.mark.parametrize(("version", "key"), [("4.10", "byte_offset"), ("3.30", "additional_byte_offset")])
+def test_a_channel_of_an_mdf_file_beyond_its_records_is_refused(tmp_path, version, key):
+    """What unpacks records would read on behind the file, and end the interpreter."""
+    asammdf = pytest.importorskip("asammdf")
+    values = np.arange(100.0)
+    with asammdf.MDF(version=version) as content:
+        content.append([asammdf.Signal(values, values / 100.0, name=name, unit="N") for name in ("force", "acc")])
+        setattr(content.groups[0].channels[2], key, 60_000)
+        written = content.save(tmp_path / "a.mdf", overwrite=True)
+    with pytest.raises(FileFormatError, match=r"says that 'acc' ends at byte 600\d\d of records of 24 bytes"):
+        open_recording(written, ["force"], TableKeys())
+
+
 def test_a_formula_of_an_mdf_file_costs_its_channel_only(tmp_path):
     asammdf = pytest.importorskip("asammdf")
     values = np.arange(64)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader, import_reader
 from frf_ipz.ingest.formats.file_arrays import MOST_EXPANDED
 from frf_ipz.ingest.formats.signal_table import Signal, SignalFormat, SignalTable
@@ -51,6 +52,8 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
         linear = LINEAR.get(content.version[0], set())
         sizes = [group.channel_group.cycles_nr * 8 * len(group.channels) for group in content.groups]
         require_expanded(path, sum(sizes), file_bytes=len(data), most_bytes=MOST_EXPANDED)
+        for group in content.groups:
+            _require_within_records(path, group)
         names = Counter(channel.name for group in content.groups for channel in group.channels)
         for number, group in enumerate(content.groups):
             for place, channel in enumerate(group.channels):
@@ -77,6 +80,20 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
 
 
 FORMAT = SignalFormat(rank=10, recognises=_recognises, read=_read)
+
+
+def _require_within_records(path: Path, group: Any) -> None:  # noqa: ANN401 - as asammdf has them
+    """Refuse channels that do not lie in their records: asammdf would read on behind the file."""
+    length = group.channel_group.samples_byte_nr
+    for channel in group.channels:
+        if hasattr(channel, "byte_offset"):  # version 4
+            first_bit = 8 * channel.byte_offset + channel.bit_offset
+        else:
+            first_bit = 8 * channel.additional_byte_offset + channel.start_offset
+        end = -(-(first_bit + channel.bit_count) // 8)
+        if end > length:
+            problem = f"says that '{channel.name}' ends at byte {end} of records of {length} bytes; is it damaged?"
+            raise FileFormatError(path, problem)
 
 
 @contextmanager
