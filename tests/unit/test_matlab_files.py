@@ -153,6 +153,15 @@ def test_what_no_program_writes_is_refused(tmp_path, body):
         read_matlab(path)
 
 
+def test_a_sparse_matrix_that_is_logical_and_complex_is_refused(tmp_path):
+    """SciPy would take what follows for imaginary parts."""
+    path = tmp_path / "a.mat"
+    entries = element(5, bytes(4)), element(5, struct.pack("<2i", 0, 1)), element(9, b"\1")
+    path.write_bytes(header() + matrix(0xA05, *entries))
+    with pytest.raises(FileFormatError, match="logical and complex"):
+        read_matlab(path)
+
+
 def test_a_changed_byte_gives_values_or_the_error_of_the_project(tmp_path):
     path = tmp_path / "a.mat"
     savemat(path, RICH, do_compression=False)
