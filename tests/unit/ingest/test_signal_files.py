@@ -22,6 +22,7 @@ RATE_HZ = 2048.0
 SIGNALS = impact(Structure(), n_samples=512)
 NAMES, UNITS = ("force", "acc_1", "acc_2"), ("N", "m/s^2", "m/s^2")
 TIME = np.arange(512) / RATE_HZ
+SHORT_BLOCK = 218  # bytes of a channel of MDF without long names and a further offset
 DIGITS = 1e-15  # relative: openpyxl writes 16 digits
 
 
@@ -179,6 +180,20 @@ def test_a_channel_of_an_mdf_file_beyond_its_records_is_refused(tmp_path, versio
         written = content.save(tmp_path / "a.mdf", overwrite=True)
     with pytest.raises(FileFormatError, match=r"says that 'acc' ends at byte 600\d\d of records of 24 bytes"):
         open_recording(written, ["force"], TableKeys())
+
+
+def test_an_mdf_file_of_short_blocks_is_read(tmp_path):
+    """As before version 3: channels without a further offset."""
+    asammdf = pytest.importorskip("asammdf")
+    values = np.arange(100.0)
+    with asammdf.MDF(version="3.30") as content:
+        content.append([asammdf.Signal(values, values / 100.0, name=name, unit="N") for name in ("force", "acc")])
+        for channel in content.groups[0].channels:
+            channel.block_len = SHORT_BLOCK
+        written = content.save(tmp_path / "a.mdf", overwrite=True)
+    with asammdf.MDF(written) as content:
+        assert not hasattr(content.groups[0].channels[1], "additional_byte_offset")
+    assert len(next(open_recording(written, ["force"], TableKeys()).blocks)) == len(values)
 
 
 def test_a_formula_of_an_mdf_file_costs_its_channel_only(tmp_path):

@@ -217,7 +217,7 @@ def _by_pole(rows: FloatArray, n_poles: int) -> FloatArray:
 
 def _error_of_known_noise(
     data: WeightedLines, noise: ForceNoise, fit: RefinedPoles, terms: SmoothTerms, basis: ComplexArray
-) -> ForceError | None:
+) -> ForceError:
     """Find the error of each force whose noise is known: its few samples, over the force."""
     modelled = response(fit.system, terms, data.s)
     first_s, last_s = noise.interval_s
@@ -233,9 +233,8 @@ def _error_of_known_noise(
         values = modelled[:, of_force] * weight
         misfit = (data.receptance - modelled)[:, of_force] * weight
         misfit = misfit - basis @ (basis.conj().T @ misfit).real
-        sizes = (
-            values * noise.relative[:, of_force] / np.sqrt(len(times))
-        )  # of samples, one in the mean square together
+        # of samples that are one in the mean square together
+        sizes = values * noise.relative[:, of_force] / np.sqrt(len(times))
         gram, right = np.zeros((len(times), len(times))), np.zeros(len(times))
         followed = np.zeros((len(of_force), basis.shape[1], len(times)))
         for some in _blocks_of(len(data.s)):

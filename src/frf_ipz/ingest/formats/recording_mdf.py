@@ -88,8 +88,8 @@ def _require_within_records(path: Path, group: Any) -> None:  # noqa: ANN401 - a
     for channel in group.channels:
         if hasattr(channel, "byte_offset"):  # version 4
             first_bit = 8 * channel.byte_offset + channel.bit_offset
-        else:
-            first_bit = 8 * channel.additional_byte_offset + channel.start_offset
+        else:  # short blocks of version 3 and older have no further offset
+            first_bit = 8 * getattr(channel, "additional_byte_offset", 0) + channel.start_offset
         end = -(-(first_bit + channel.bit_count) // 8)
         if end > length:
             problem = f"says that '{channel.name}' ends at byte {end} of records of {length} bytes; is it damaged?"
