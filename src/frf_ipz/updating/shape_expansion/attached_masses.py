@@ -40,6 +40,7 @@ FEW = 0.3  # masses to start from, in their deviation: little is attached
 DIFFERENCE = 1e-5  # of an unknown, of size 1: between rounding and curvature
 EVEN, FLAT = 1e-14, 1e-6  # relative decrease and slope of the evidence where it has converged: what differences tell
 MOST_PLACES = 8
+FARTHEST = 30.0  # that an unknown is searched, in deviations of its prior: no data outweigh it, no number overflows
 RIGID = 1e-3  # of the lowest measured frequency: a mode of the model below is one of a rigid body, but for rounding
 STEP = 0.05  # of a logarithm, over which the curvature of the evidence is taken
 Q90 = 1.645
@@ -139,12 +140,18 @@ def find_attached_masses(model: ReducedModel, measured: MeasuredShapes, places: 
         after, before = cost(unknowns + np.stack([steps, -steps]))
         return float(cost(unknowns)), np.asarray((after - before) / (2 * DIFFERENCE))
 
-    bounds = [(0.0, None) if 1 <= place <= count else (None, None) for place in range(len(typical))]
+    least, most = typical - FARTHEST * deviations, typical + FARTHEST * deviations
+    least[1 : 1 + count] = 0.0
     few = typical + np.concatenate([[0.0], np.full(count, FEW), [0.0, 0.0]])
     starts = [np.concatenate([few[:-1], [np.log(scatter)]]) for scatter in STARTS]
     optima = [
         optimize.minimize(
-            with_slope, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": EVEN, "gtol": FLAT}
+            with_slope,
+            start,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=optimize.Bounds(least, most),
+            options={"ftol": EVEN, "gtol": FLAT},
         )
         for start in starts
     ]
@@ -152,8 +159,8 @@ def find_attached_masses(model: ReducedModel, measured: MeasuredShapes, places: 
     std = _deviations(cost, best, deviations)
     low, middle, high = (masses_of(np.maximum(best + width * std, 0.0)) for width in (-Q90, 0.0, Q90))
     masses = [
-        AttachedMass(place=place.name, mass_kg=float(mass), low_kg=float(least), high_kg=float(most))
-        for place, mass, least, most in zip(places, middle, low, high, strict=True)
+        AttachedMass(place=place.name, mass_kg=float(mass), low_kg=float(lowest), high_kg=float(highest))
+        for place, mass, lowest, highest in zip(places, middle, low, high, strict=True)
     ]
     mass, stiffness = loaded(best)
     return LoadedModel(
