@@ -256,6 +256,17 @@ def test_a_delay_that_all_responses_share_is_found(samples):
     assert not fit_modes(late, options=FitOptions(delay=False)).model.delay_s.any()
 
 
+@pytest.mark.parametrize(("samples", "seed"), [(40.0, 2), (9.0, 0)], ids=["poles that describe it", "beating modes"])
+def test_a_delay_of_many_samples_is_no_modes(samples, seed):
+    """So many poles fit late responses to the noise that the fit once believed them; where modes beat, a later rise."""
+    truth = random_modes(SPREAD, 0.005, n_outputs=2, n_inputs=1, seed=seed)
+    frfs = accelerances(truth, LINES_HZ, noise=1e-3, seed=seed)
+    late = replace(frfs, values=frfs.values * np.exp(-frfs.s[:, None] * samples / 2048))
+    fit = fit_modes(late)
+    assert_complete(fit, truth)
+    np.testing.assert_allclose(fit.model.delay_s, samples / 2048, rtol=0, atol=5e-7)
+
+
 @pytest.mark.slow
 def test_one_channel_that_is_late_is_named():
     truth = random_modes(SPREAD, 0.005, n_outputs=2, n_inputs=1, seed=SEED)

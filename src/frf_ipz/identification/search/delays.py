@@ -187,6 +187,30 @@ def measure_delay(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms,
     return CommonDelay(delay_s=delay_s, std_s=max(by_noise, _std_of_median(each)))
 
 
+def delay_of_normal_modes(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms) -> tuple[float, float]:
+    """Find the delay that suits normal modes best, and what they leave then.
+
+    Parameters
+    ----------
+    lines : MeasuredLines
+        Lines and weights.
+    poles : (n_poles,) complex array
+        Poles, rad/s.
+    terms : SmoothTerms
+        Terms for modes out of band.
+
+    Returns
+    -------
+    delay_s : float
+        s.
+    misfit : float
+        Sum of squares over the noise.
+    """
+    n_frfs = lines.receptance.shape[1]
+    delays_s = find_delays(_normal(lines), poles, terms, np.zeros(n_frfs, np.int64))
+    return float(delays_s[0]), _misfit(_normal(lines.advanced(delays_s)), poles, terms)
+
+
 def _std_of_median(values: FloatArray) -> float:
     """Give the standard deviation of the median of normally distributed values by their own scatter."""
     deviation = np.median(np.abs(values - np.median(values))) / special.ndtri(0.75)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import log
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,8 +27,15 @@ from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_po
 from frf_ipz.identification.likelihood.sandwich import pole_variance_factors
 from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms, smooth_terms_of_band
 from frf_ipz.identification.measured_lines import MeasuredLines, WeightedLines, measured_lines, with_misfit_noise
-from frf_ipz.identification.search.arrivals import find_arrival
-from frf_ipz.identification.search.delays import CommonDelay, common_delay, each_delay, explains_misfit, measure_delay
+from frf_ipz.identification.search.arrivals import find_arrivals
+from frf_ipz.identification.search.delays import (
+    CommonDelay,
+    common_delay,
+    delay_of_normal_modes,
+    each_delay,
+    explains_misfit,
+    measure_delay,
+)
 from frf_ipz.identification.search.discrepancy import with_discrepancy
 from frf_ipz.identification.search.drift import Drift
 from frf_ipz.identification.search.force_error import ForceError
@@ -141,35 +149,36 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
     """
     progress(0.0, "choosing lines")
     lines = measured_lines(frfs, options)
+    late = _fit_late_responses(frfs, lines, options) if options.delay is None else None
+    if late is not None and np.median(late.misfit_ratio) < MODEL_ERROR:
+        return late
     try:
         fitted = _find_modes(frfs, lines, options, progress)
     except NoModesError:
-        if options.delay is not None:
-            raise
-        late = _fit_late_responses(frfs, lines, None, options)
         if late is None:
             raise
         return late
-    if options.delay is None and np.median(fitted.misfit_ratio) > MODEL_ERROR:
-        progress(0.6, "looking for responses that are far too late")
-        fitted = _fit_late_responses(frfs, lines, fitted, options) or fitted
+    if late is not None and np.median(late.misfit_ratio) < LATE_MISFIT * np.median(fitted.misfit_ratio):
+        fitted = late
     if options.delay is None and np.median(fitted.misfit_ratio) > MODEL_ERROR:
         return _fit_delayed_channels(frfs, fitted, options) or fitted
     return fitted
 
 
-def _fit_late_responses(
-    frfs: FrfSet, lines: MeasuredLines, fitted: FittedModes | None, options: FitOptions
-) -> FittedModes | None:
-    """Fit without a delay of periods, where the responses begin so much off the force; None where that is no better."""
-    arrival_s = find_arrival(lines)
-    known_s = 0.0 if fitted is None or fitted.common_delay is None else fitted.common_delay.delay_s
-    if abs(arrival_s - known_s) * lines.band_hz[1] < FAR_OFF:
+def _fit_late_responses(frfs: FrfSet, lines: MeasuredLines, options: FitOptions) -> FittedModes | None:
+    """Fit without a delay of periods, where the responses begin so much off the force; None where that is no better.
+
+    It comes before all else, as enough poles describe any delay: of late responses they are modes that do not exist.
+    """
+    arrivals_s = find_arrivals(lines)
+    if not len(arrivals_s) or abs(arrivals_s[0]) * lines.band_hz[1] < FAR_OFF:
         return None
-    # an arrival is late where modes beat: the grid of delays reaches a period before it, so further ones are tried
+    _, misfit_without = _first_delay(frfs, lines, 0.0, options)
+    trials = sorted((_first_delay(frfs, lines, float(first_s), options) for first_s in arrivals_s), key=itemgetter(1))
     best: tuple[float, FittedModes] | None = None
-    for periods in (0.0, 1.0, 2.0):
-        first_s = arrival_s - periods / lines.band_hz[1]
+    for first_s, misfit in trials:
+        if not misfit < LATE_MISFIT**2 * misfit_without:
+            break
         late = _fit_from(frfs, first_s, options)
         if late is not None and (best is None or np.median(late.misfit_ratio) < np.median(best[1].misfit_ratio)):
             best = first_s, late
@@ -178,14 +187,24 @@ def _fit_late_responses(
     if best is None:
         return None
     first_s, late = best
-    if fitted is not None and np.median(late.misfit_ratio) > LATE_MISFIT * np.median(fitted.misfit_ratio):
-        return None
     delay_s = first_s + float(late.delay_s[0])
     weighed = replace(late.lines, variance=late.noise).advanced(np.full(frfs.n_frfs, -delay_s))
     delay = measure_delay(weighed, late.fit.poles, late.terms, delay_s)
     if not np.isfinite(delay.std_s):
         return None
     return replace(late, delay_s=np.full(frfs.n_frfs, delay_s), common_delay=delay)
+
+
+def _first_delay(frfs: FrfSet, lines: MeasuredLines, first_s: float, options: FitOptions) -> tuple[float, float]:
+    """Find a delay near a first one by normal modes that are roughly right, and their misfit."""
+    advanced = lines.advanced(np.full(frfs.n_frfs, first_s))
+    start = find_start_poles(frfs, advanced, max_order=options.max_order)
+    if not len(start.poles):
+        return first_s, float("inf")
+    terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(FIXED_POLES)
+    fit = refine_poles(advanced.weighted(shared=True), start.poles, terms, iterations=ROUGH_ITERATIONS)
+    more_s, misfit = delay_of_normal_modes(advanced, fit.poles, terms)
+    return first_s + more_s, misfit
 
 
 def _fit_from(frfs: FrfSet, first_s: float, options: FitOptions) -> FittedModes | None:
