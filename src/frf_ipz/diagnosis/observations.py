@@ -47,6 +47,52 @@ class Sensor:
     quantity: FrfQuantity
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ResidualMotion:
+    """Motion that an earlier impact has left in a record, as far as it is not known.
+
+    Parameters
+    ----------
+    poles : (n_poles,) complex array
+        Of the modes that move, rad/s.
+    start_s : float
+        Time in the recording at which the amplitudes are those of the columns.
+    columns : (n_sensors, 2 n_poles, n_columns) array
+        Amplitudes of decaying cosines, then of sines, as independent columns of one standard deviation each; those of
+        all records of a channel are the same columns.
+    """
+
+    poles: ComplexArray
+    start_s: float
+    columns: FloatArray
+
+    def transform(self, s: ComplexArray, sensor: int, record: ObservedRecord) -> ComplexArray:
+        """Transform the columns of a sensor over a record.
+
+        Parameters
+        ----------
+        s : (n_points,) complex array
+            rad/s.
+        sensor : int
+            Row of the responses.
+        record : ObservedRecord
+            Whose residual motion it is; its first samples may have been cut.
+
+        Returns
+        -------
+        (n_points, n_columns) complex array
+            SI times s.
+        """
+        count, step = len(self.poles), record.step_s
+        begun = np.exp(self.poles * (record.start_s - self.start_s))[:, None]
+        half = (self.columns[sensor, :count] - 1j * self.columns[sensor, count:]) * begun / 2
+        total = np.zeros((len(s), self.columns.shape[2]), np.complex128)
+        for poles, amplitudes in ((self.poles, half), (self.poles.conj(), half.conj())):
+            turn = np.exp((poles - s[:, None]) * step)
+            total += step * (1 - turn**record.n_samples) / (1 - turn) @ amplitudes
+        return total
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class ObservedRecord(Concise):
     """One impact of a hammer, or one run of a shaker, with its responses.
@@ -77,6 +123,8 @@ class ObservedRecord(Concise):
         Time of its first sample in its recording, s.
     dc_offset_std : (n_sensors,) array, optional
         Standard deviation of offsets that may remain in the responses, SI; none where it is left out.
+    residual_motion : ResidualMotion, optional
+        What may remain in the responses of motion that an earlier impact has left.
     noise_levels : mapping of str to float, optional
         Of channels, the noise power of this record over that of the mean of all records; not measured where it is left
         out.
@@ -94,6 +142,7 @@ class ObservedRecord(Concise):
     number: int = 1
     start_s: float = 0.0
     dc_offset_std: FloatArray | None = None
+    residual_motion: ResidualMotion | None = None
     noise_levels: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:

@@ -325,6 +325,7 @@ def estimate_transfer_functions(survey: RecordSurvey, s: ComplexArray) -> Transf
             errors = np.column_stack(
                 [
                     _dc_offset_error(points, group, column),
+                    _residual_motion_errors(points, group, column),
                     _missing_ringing_errors(survey, index, points, column),
                     (units * amplitudes[..., column]).reshape(len(s), -1),
                 ]
@@ -348,6 +349,16 @@ def _dc_offset_error(points: GroupSpectra, group: tuple[ObservedRecord, ...], co
     units = (1 - np.exp(-np.outer(points.s, durations))) / points.s[:, None]
     stds = np.array([0.0 if record.dc_offset_std is None else record.dc_offset_std[column] for record in group])
     return np.asarray(np.sum(points.force.conj() * units * stds, 1) / points.power)
+
+
+def _residual_motion_errors(points: GroupSpectra, group: tuple[ObservedRecord, ...], column: int) -> ComplexArray:
+    """Errors of an FRF, as independent columns, by what is not known of the motion that earlier impacts have left."""
+    parts = [
+        (force.conj() / points.power)[:, None] * record.residual_motion.transform(points.s, column, record)
+        for force, record in zip(points.force.T, group, strict=True)
+        if record.residual_motion is not None
+    ]
+    return np.asarray(sum(parts)) if parts else np.zeros((len(points.s), 0), np.complex128)
 
 
 def _missing_ringing_errors(survey: RecordSurvey, index: int, points: GroupSpectra, column: int) -> ComplexArray:
@@ -414,7 +425,7 @@ def _noise_covariance(noise: Noise, s: ComplexArray, duration_s: float) -> Compl
 def _shared_errors(survey: RecordSurvey, index: int, points: GroupSpectra) -> ComplexArray:
     """Errors that the force's noise puts on all FRFs of a group, as independent columns."""
     n = len(points.frequency_hz)
-    if survey.force.white == 0:
+    if survey.force.white == 0 and survey.force.pink == 0:
         return np.zeros((n, 0), np.complex128)
     s = points.s
     root = np.sqrt(survey.force.density(points.frequency_hz))

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import special
 from scipy.optimize import nnls
 
 from frf_ipz.arrays import FloatArray
@@ -49,6 +50,31 @@ class Noise:
             unit^2 s.
         """
         return self.white + self.pink / np.maximum(frequency_hz, 1e-9)
+
+    def autocovariance(self, n_samples: int, step_s: float, longest_s: float) -> FloatArray:
+        """Compute what neighbouring samples have in common.
+
+        Parameters
+        ----------
+        n_samples : int
+            How many.
+        step_s : float
+            Between samples, s.
+        longest_s : float
+            Longest period that counts: slower noise is an offset.
+
+        Returns
+        -------
+        (n_samples,) array
+            Covariance with the first sample, unit^2: the transform of the density up to half the rate.
+        """
+        lags = step_s * np.arange(n_samples)
+        slowest, fastest = 1 / longest_s, 0.5 / step_s
+        pink = np.full(n_samples, np.log(fastest / slowest))
+        pink[1:] = special.sici(2 * np.pi * fastest * lags[1:])[1] - special.sici(2 * np.pi * slowest * lags[1:])[1]
+        covariance = 2 * self.pink * pink
+        covariance[0] += self.white / step_s
+        return covariance
 
     def rounded(self, signals: Iterable[FloatArray], step_s: float) -> Noise:
         """Add the quantisation noise of a recorder: a channel that stays on one step seems to have no noise.

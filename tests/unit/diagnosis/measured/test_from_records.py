@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from frf_ipz.diagnosis.measured.from_records import estimate_transfer_functions, survey_records
+from frf_ipz.diagnosis.measured.noise import Noise
 from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
 from frf_ipz.dofs import parse_dof
 from frf_ipz.quantities import FrfQuantity
@@ -102,6 +103,19 @@ def test_noise_of_a_force_that_falls_with_the_frequency_is_known_at_both_ends_of
         densities.append(survey.force.density(np.array([19.0, 255.0])))
     ratio = np.median(densities, axis=0) / (white + pink / np.array([19.0, 255.0]))
     assert np.all((ratio > 0.5) & (ratio < 2.0))
+
+
+def test_noise_of_a_force_counts_where_none_of_it_is_white():
+    """Two of the densities that are read from channels may have no white part, and the median of all then neither."""
+    records = tuple(record(f"r{k}", k, 1e-3) for k in range(3))
+    survey = survey_records(Observations(kind="random", records=records, band_hz=(30.0, 390.0)))
+    s = 3.0 + 2j * np.pi * np.arange(40.0, 180.0, 10.0)
+    no_white, traces = (
+        estimate_transfer_functions(replace(survey, force=Noise(white=white, pink=1e-6)), s).shared_errors[0]
+        for white in (0.0, 1e-20)
+    )
+    assert np.abs(no_white).max() > 0
+    np.testing.assert_allclose(no_white @ no_white.conj().T, traces @ traces.conj().T, rtol=1e-6)
 
 
 def test_records_that_end_in_motion_have_the_error_of_what_is_missing():

@@ -16,6 +16,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import linalg
 from scipy.linalg import block_diag
 from scipy.ndimage import uniform_filter1d
 
@@ -31,6 +32,8 @@ from frf_ipz.diagnosis.measured.forces import (
 )
 from frf_ipz.diagnosis.measured.group_spectra import FINER, GroupSpectra, group_records, transform_group
 from frf_ipz.diagnosis.measured.local_pole import LocalPole, fit_local_pole, lines_around_pole
+from frf_ipz.diagnosis.measured.noise import Noise, fit_noise
+from frf_ipz.diagnosis.observations import ResidualMotion
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.observations import Observations, ObservedRecord
@@ -42,10 +45,13 @@ STATE_ERROR = 0.01  # of a mode's residual motion: impacts do not hit one exact 
 MODEL_ERROR = 0.003  # of a response: misfit by sampling and by the positions of impacts
 SMOOTHED_LINES = 11  # over which the energy that no FRF explains is averaged
 ROUNDS = 3  # of weights: in the first one residual motion counts as noise
-CORRELATED_NOISE = 0.1  # of a sample's variance: noise that the samples before an impact have in common
+MOST_SAMPLES_BEFORE = (
+    1000  # an impact, the last, that are weighed: what they have in common limits what more would tell
+)
 MIN_RECORDS = 2  # of a shaker in a group: a single one determines no offset
 STARTED = 0.02  # of a shaker's largest force: with more it has started
 MIN_SAMPLES_BEFORE = 4  # an impact, that show the residual motion
+ROUNDING = 1e-6  # of the largest column of an uncertainty: smaller ones are left out
 LEAST_NOISE = 1e-7  # of a channel's highest value: below the resolution of 24 bits, for channels that show nothing
 
 
@@ -157,7 +163,7 @@ def remove_residual_motion(observations: Observations) -> Observations:
         return observations
     decay = WINDOW_DECAYS / min(record.duration_s for record in observations.records)
     groups = [_prepare_group(records, observations, decay) for records in record_groups]
-    residual: dict[tuple[str, str], tuple[FloatArray, float]] = {}
+    residual: dict[tuple[str, str], _Estimate] = {}
     for channel in dict.fromkeys(sensor.channel for group in groups for sensor in group.records[0].sensors):
         rows = [
             (group, row)
@@ -165,7 +171,7 @@ def remove_residual_motion(observations: Observations) -> Observations:
             for row, sensor in enumerate(group.records[0].sensors)
             if sensor.channel == channel
         ]
-        residual |= {(name, channel): signal for name, signal in _estimate_channel(rows).items()}
+        residual |= {(name, channel): estimate for name, estimate in _estimate_channel(rows).items()}
     return replace(observations, records=tuple(_subtract(record, residual) for record in observations.records))
 
 
@@ -205,9 +211,31 @@ def _gate_from_start(record: ObservedRecord) -> Pulse:
     )
 
 
-def _subtract(record: ObservedRecord, residual: dict[tuple[str, str], tuple[FloatArray, float]]) -> ObservedRecord:
-    signals, stds = zip(*(residual[record.name, sensor.channel] for sensor in record.sensors), strict=True)
-    return replace(record, responses=record.responses - np.array(signals), dc_offset_std=np.array(stds))
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Estimate:
+    """The residual motion of a record in one channel, and how well it is known.
+
+    The amplitudes of modes are uncertain by independent columns, (2 n_poles, n), shared by all records of the channel.
+    """
+
+    signal: FloatArray
+    offset_std: float
+    poles: ComplexArray
+    columns: FloatArray
+
+
+def _subtract(record: ObservedRecord, residual: dict[tuple[str, str], _Estimate]) -> ObservedRecord:
+    estimates = [residual[record.name, sensor.channel] for sensor in record.sensors]
+    poles, most = estimates[0].poles, max(estimate.columns.shape[1] for estimate in estimates)
+    columns = np.zeros((len(estimates), 2 * len(poles), most))
+    for row, estimate in enumerate(estimates):
+        columns[row, :, : estimate.columns.shape[1]] = estimate.columns
+    return replace(
+        record,
+        responses=record.responses - np.array([estimate.signal for estimate in estimates]),
+        dc_offset_std=np.array([estimate.offset_std for estimate in estimates]),
+        residual_motion=ResidualMotion(poles=poles, start_s=record.start_s, columns=columns) if len(poles) else None,
+    )
 
 
 def _find_poles(lines: GroupSpectra, decay: float) -> list[LocalPole]:
@@ -225,13 +253,13 @@ def _find_poles(lines: GroupSpectra, decay: float) -> list[LocalPole]:
     return poles
 
 
-def _estimate_channel(rows: list[tuple[_Group, int]]) -> dict[str, tuple[FloatArray, float]]:
-    """Give the residual motion of all records in one channel, as signals, and standard deviations of the offsets."""
+def _estimate_channel(rows: list[tuple[_Group, int]]) -> dict[str, _Estimate]:
+    """Estimate the residual motion of all records in one channel."""
     largest = max(float(np.abs(record.responses[row]).max()) for group, row in rows for record in group.records)
     least_noise = LEAST_NOISE * (largest or 1.0)  # of a channel that shows nothing at all, nothing is subtracted
     amplitudes = [[np.zeros(group.n_terms(record)) for record in group.records] for group, _ in rows]
     priors = [_prior_root(group, row) for group, row in rows]
-    stds = np.zeros(0)
+    root, offsets = np.zeros((0, 0)), np.zeros(0, np.int64)
     for _ in range(ROUNDS):
         equations = [
             _normal_equations(group, row, of_group, least_noise)
@@ -247,18 +275,38 @@ def _estimate_channel(rows: list[tuple[_Group, int]]) -> dict[str, tuple[FloatAr
         of_offsets[offsets] = np.hstack([np.full((len(offsets), 1), LARGEST_OFFSET * largest), block_diag(*drift)])
         spread = np.hstack([block_diag(*priors), of_offsets])
         information = spread.T @ block_diag(*(normal.curvature for normal in equations)) @ spread
-        covariance = spread @ np.linalg.solve(np.eye(len(information)) + information, spread.T)
-        estimate = covariance @ np.concatenate([normal.slope for normal in equations])
+        lower = linalg.cholesky(np.eye(len(information)) + information, lower=True)
+        root = linalg.solve_triangular(lower, spread.T, lower=True).T  # of the covariance of what is estimated
+        estimate = root @ (root.T @ np.concatenate([normal.slope for normal in equations]))
         amplitudes = [
             np.split(part, normal.offset_rows[1:])
             for part, normal in zip(np.split(estimate, before[1:-1]), equations, strict=True)
         ]
-        stds = np.sqrt(np.maximum(np.diag(covariance)[offsets], 0.0))
     records = [(group, record) for group, _ in rows for record in group.records]
+    poles = [group.poles if record.has_predecessor else group.poles[:0] for group, record in records]
+    of_modes = [
+        offset + 1 + FIRST_SAMPLES + np.arange(2 * len(moving)) for offset, moving in zip(offsets, poles, strict=True)
+    ]
+    columns = _few_columns(root[np.concatenate(of_modes)])
+    by_record = np.split(columns, np.cumsum([len(places) for places in of_modes])[:-1])
     return {
-        record.name: (of_record @ group.unit_signals(record), float(std))
-        for (group, record), of_record, std in zip(records, chain.from_iterable(amplitudes), stds, strict=True)
+        record.name: _Estimate(
+            signal=of_record @ group.unit_signals(record),
+            offset_std=float(np.linalg.norm(root[offset])),
+            poles=moving,
+            columns=part,
+        )
+        for (group, record), of_record, offset, moving, part in zip(
+            records, chain.from_iterable(amplitudes), offsets, poles, by_record, strict=True
+        )
     }
+
+
+def _few_columns(root: FloatArray) -> FloatArray:
+    """Give as few columns as have the same covariance, but for rounding."""
+    directions, sizes, _ = np.linalg.svd(root, full_matrices=False)
+    large = sizes > ROUNDING * sizes.max(initial=0.0)
+    return np.asarray(directions[:, large] * sizes[large])
 
 
 def _normal_equations(group: _Group, row: int, amplitudes: list[FloatArray], least_noise: float) -> _NormalEquations:
@@ -268,14 +316,21 @@ def _normal_equations(group: _Group, row: int, amplitudes: list[FloatArray], lea
     per_square = 2 * group.lines.s.real[0] / group.records[0].step_s
     energy = _unexplained_energy(force, rest) + least_noise**2 / per_square
     noise = float(np.sqrt(np.median(energy) * per_square))
-    weight = 1 / (energy[:, None] + (MODEL_ERROR * np.abs(rest)) ** 2)
+    weight = 1 / (_lines_of_one_number(group.lines) * (energy[:, None] + (MODEL_ERROR * np.abs(rest)) ** 2))
     shared = weight * force / np.sqrt(np.sum(weight * np.abs(force) ** 2, 1))[:, None]
     across = np.hstack([column[:, None].conj() * unit for column, unit in zip(shared.T, units, strict=True)])
     along = np.sum(shared.conj() * response, 1)
     weighted = [(unit.conj() * part[:, None]).T for unit, part in zip(units, weight.T, strict=True)]
     before = [record.responses[row, : pulse.start] for record, pulse in zip(group.records, group.pulses, strict=True)]
+    density = fit_noise(
+        group.lines.frequency_hz[::FINER],
+        energy,
+        np.full(len(energy), 0.5 / group.lines.s.real[0]),
+        np.mean((MODEL_ERROR * np.abs(rest)) ** 2, axis=1),
+    )
     quiet = [
-        _equations_before(group, record, samples, noise) for record, samples in zip(group.records, before, strict=True)
+        _equations_before(group, record, samples, density)
+        for record, samples in zip(group.records, before, strict=True)
     ]
     curvatures = [(part @ unit).real + added for part, unit, (added, _) in zip(weighted, units, quiet, strict=True)]
     slopes = [
@@ -289,14 +344,28 @@ def _normal_equations(group: _Group, row: int, amplitudes: list[FloatArray], lea
     )
 
 
+def _lines_of_one_number(lines: GroupSpectra) -> float:
+    """Count the lines that tell as much as a single independent one.
+
+    Squares summed over lines ``d`` apart are ``2 pi / d`` times the energy of a motion under the window (Parseval), and
+    noise has its density over ``2 sigma`` on each. Energy over density is what a motion that dies out under the window
+    is known by, so each is counted ``2 sigma 2 pi / d`` times; one that goes on is known 1.4 times better than that.
+    """
+    distance = float(np.median(np.diff(lines.s[::FINER].imag)))
+    return max(4 * np.pi * float(lines.s.real[0]) / distance, 1.0)
+
+
 def _equations_before(
-    group: _Group, record: ObservedRecord, before: FloatArray, noise: float
+    group: _Group, record: ObservedRecord, before: FloatArray, noise: Noise
 ) -> tuple[FloatArray, FloatArray]:
     """Curvature and slope by the samples before the impact."""
-    n = len(before)
-    units = group.unit_signals(record)[:, :n]
-    variance = noise**2 * (1 + CORRELATED_NOISE * n)
-    return np.asarray(units @ units.T / variance), np.asarray(units @ before / variance)
+    samples = before[-MOST_SAMPLES_BEFORE:]
+    units = group.unit_signals(record)[:, len(before) - len(samples) : len(before)]
+    if not len(samples):
+        return np.zeros((len(units), len(units))), np.zeros(len(units))
+    covariance = noise.autocovariance(len(samples), record.step_s, record.duration_s)
+    weighted = linalg.solve_toeplitz(covariance, units.T)
+    return np.asarray(units @ weighted), np.asarray(samples @ weighted)
 
 
 def _prior_root(group: _Group, row: int) -> FloatArray:
