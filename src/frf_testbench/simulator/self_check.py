@@ -131,7 +131,7 @@ def _estimate_from_records(system: TrueSystem, rng: np.random.Generator) -> tupl
     return np.asarray(sigma + 2j * np.pi * set_up.lines_hz, np.complex128), frf.transpose(2, 1, 0)
 
 
-def check_step(effect: str, seed: int) -> tuple[float, float]:
+def check_step(effect: str, seed: int, *, structure: str | None = None) -> tuple[float, float]:
     """Halve the time step of a nonlinear case, and compare.
 
     Parameters
@@ -140,13 +140,15 @@ def check_step(effect: str, seed: int) -> tuple[float, float]:
         A nonlinear effect.
     seed : int
         Of the case.
+    structure : str, optional
+        Kind of specimen; drawn by default.
 
     Returns
     -------
     all, in_band : float
         Change of the responses, and of their part in the band, norm over norm.
     """
-    case = make_case(seed, effect)
+    case = make_case(seed, effect, structure=structure)
     system, excitations = case.system, case.excitations
     coarse, _ = simulate_records(system, excitations)
     fine, _ = simulate_records(system, excitations, refine=2)

@@ -17,7 +17,7 @@ from looking import Watch, in_a_child, look
 
 VALUES = (None, True, 0, -1, 3, 2**40, 0.5, -1e300, float("nan"), "", "z", "\x1b[2J", "../..", "\ud800", [], [[]], {})
 LOOKED_AT = ("library", "plot", "show ")  # the report draws what the page of show does
-FEW, MANY = 30, 1000
+FEW, MANY = 30, 300
 
 
 @pytest.fixture(scope="module")
