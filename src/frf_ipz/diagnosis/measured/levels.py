@@ -111,7 +111,8 @@ def compare_levels(observations: Observations, fit: ModalFit) -> LevelDependence
         records = [isolate_pulse(record).record if is_hammer else record for record in group]
         spectra = [transform(record, n)[:, :, used] for record in records]
         curves += _compare_halves(group, spectra)
-        rows += _fit_modes(group, spectra, s, fit)
+        durations_s = [record.duration_s if ends else n * step for record in records]
+        rows += _fit_modes(group, spectra, s, fit, durations_s)
     return _as_level_dependence(frequency[used], curves, rows)
 
 
@@ -164,7 +165,8 @@ def _follow_pole(
         nearest = lines_around_pole(s, start)
         if len(nearest) < MIN_LINES:
             continue
-        local = fit_local_pole(s[nearest], values[nearest], start)
+        duration_s = 2 * np.pi / float(np.median(np.diff(s.imag)))  # lines as far apart as independent ones are
+        local = fit_local_pole(s[nearest], values[nearest], start, duration_s=duration_s)
         if local is not None:
             pole = local.pole
             rows.append((mode, str(label), f"{level:g} N", level, *_frequency_and_damping(local)))
@@ -258,7 +260,11 @@ def _h1(spectra: ComplexArray) -> ComplexArray:
 
 
 def _fit_modes(
-    group: Sequence[ObservedRecord], spectra: Sequence[ComplexArray], s: ComplexArray, fit: ModalFit
+    group: Sequence[ObservedRecord],
+    spectra: Sequence[ComplexArray],
+    s: ComplexArray,
+    fit: ModalFit,
+    durations_s: Sequence[float],
 ) -> list[tuple[object, ...]]:
     labels = _labels(group[0])
     rows: list[tuple[object, ...]] = []
@@ -267,8 +273,8 @@ def _fit_modes(
         nearest = lines_around_pole(s, complex(pole))
         if sensor is None or len(nearest) < MIN_LINES:
             continue
-        for record, lines in zip(group, spectra, strict=True):
-            local = fit_local_pole(s[nearest], _h1(lines)[nearest, sensor], complex(pole))
+        for record, lines, duration_s in zip(group, spectra, durations_s, strict=True):
+            local = fit_local_pole(s[nearest], _h1(lines)[nearest, sensor], complex(pole), duration_s=duration_s)
             if local is not None:
                 rows.append((mode, str(labels[sensor]), record.name, record.level, *_frequency_and_damping(local)))
     return rows

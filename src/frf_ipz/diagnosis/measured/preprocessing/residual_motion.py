@@ -31,7 +31,12 @@ from frf_ipz.diagnosis.measured.forces import (
     missing_ringing,
 )
 from frf_ipz.diagnosis.measured.group_spectra import FINER, GroupSpectra, group_records, transform_group
-from frf_ipz.diagnosis.measured.local_pole import LocalPole, fit_local_pole, lines_around_pole
+from frf_ipz.diagnosis.measured.local_pole import (
+    LocalPole,
+    fit_local_pole,
+    lines_around_pole,
+    lines_of_one_number,
+)
 from frf_ipz.diagnosis.measured.noise import Noise, fit_noise
 from frf_ipz.diagnosis.observations import ResidualMotion
 
@@ -74,6 +79,11 @@ class _Group:
     def n_samples(self) -> int:
         """Samples that are transformed."""
         return min(record.n_samples for record in self.records)
+
+    @property
+    def duration_s(self) -> float:
+        """Time that is transformed."""
+        return self.n_samples * self.records[0].step_s
 
     def n_terms(self, record: ObservedRecord) -> int:
         """Count the terms of the residual motion in a record."""
@@ -185,7 +195,8 @@ def _prepare_group(records: tuple[ObservedRecord, ...], observations: Observatio
     if any(record.has_predecessor for record in records):
         from_rest = tuple(record for record in transformed if not record.has_predecessor)
         lines_from_rest = transform_group(from_rest, observations.band_hz, decay) if from_rest else lines
-        poles = _find_poles(lines_from_rest, decay)
+        duration_s = min(record.duration_s for record in from_rest or transformed)
+        poles = _find_poles(lines_from_rest, decay, duration_s)
         peaks = [int(np.argmin(np.abs(lines_from_rest.s - pole.pole))) for pole in poles]
         distance = np.array(
             [np.abs(lines_from_rest.s[line] - pole.pole) for line, pole in zip(peaks, poles, strict=True)]
@@ -238,7 +249,7 @@ def _subtract(record: ObservedRecord, residual: dict[tuple[str, str], _Estimate]
     )
 
 
-def _find_poles(lines: GroupSpectra, decay: float) -> list[LocalPole]:
+def _find_poles(lines: GroupSpectra, decay: float, duration_s: float) -> list[LocalPole]:
     """Poles of the structure, as far as they stand out."""
     size = np.abs(lines.values) ** 2
     level = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).sum(1)
@@ -248,7 +259,7 @@ def _find_poles(lines: GroupSpectra, decay: float) -> list[LocalPole]:
         start = complex(-decay_rate, omega)
         nearest = lines_around_pole(lines.s, start)
         sensor = int(np.argmax(size[nearest].sum(0) / size.sum(0)))
-        pole = fit_local_pole(lines.s[nearest], lines.values[nearest, sensor], start)
+        pole = fit_local_pole(lines.s[nearest], lines.values[nearest, sensor], start, duration_s=duration_s)
         poles += [] if pole is None else [pole]
     return poles
 
@@ -316,7 +327,8 @@ def _normal_equations(group: _Group, row: int, amplitudes: list[FloatArray], lea
     per_square = 2 * group.lines.s.real[0] / group.records[0].step_s
     energy = _unexplained_energy(force, rest) + least_noise**2 / per_square
     noise = float(np.sqrt(np.median(energy) * per_square))
-    weight = 1 / (_lines_of_one_number(group.lines) * (energy[:, None] + (MODEL_ERROR * np.abs(rest)) ** 2))
+    alike = lines_of_one_number(group.lines.s[::FINER], group.duration_s)
+    weight = 1 / (alike * (energy[:, None] + (MODEL_ERROR * np.abs(rest)) ** 2))
     shared = weight * force / np.sqrt(np.sum(weight * np.abs(force) ** 2, 1))[:, None]
     across = np.hstack([column[:, None].conj() * unit for column, unit in zip(shared.T, units, strict=True)])
     along = np.sum(shared.conj() * response, 1)
@@ -342,17 +354,6 @@ def _normal_equations(group: _Group, row: int, amplitudes: list[FloatArray], lea
         curvature=block_diag(*curvatures) - (across.conj().T @ across).real,
         slope=np.concatenate(slopes) - (across.conj().T @ along).real,
     )
-
-
-def _lines_of_one_number(lines: GroupSpectra) -> float:
-    """Count the lines that tell as much as a single independent one.
-
-    Squares summed over lines ``d`` apart are ``2 pi / d`` times the energy of a motion under the window (Parseval), and
-    noise has its density over ``2 sigma`` on each. Energy over density is what a motion that dies out under the window
-    is known by, so each is counted ``2 sigma 2 pi / d`` times; one that goes on is known 1.4 times better than that.
-    """
-    distance = float(np.median(np.diff(lines.s[::FINER].imag)))
-    return max(4 * np.pi * float(lines.s.real[0]) / distance, 1.0)
 
 
 def _equations_before(
