@@ -286,8 +286,8 @@ def _estimate_channel(rows: list[tuple[_Group, int]]) -> dict[str, _Estimate]:
         of_offsets[offsets] = np.hstack([np.full((len(offsets), 1), LARGEST_OFFSET * largest), block_diag(*drift)])
         spread = np.hstack([block_diag(*priors), of_offsets])
         information = spread.T @ block_diag(*(normal.curvature for normal in equations)) @ spread
-        lower = linalg.cholesky(np.eye(len(information)) + information, lower=True)
-        root = linalg.solve_triangular(lower, spread.T, lower=True).T  # of the covariance of what is estimated
+        told, directions = linalg.eigh(information)  # by rounding, what little is told may fall below nothing
+        root = spread @ (directions / np.sqrt(1 + np.maximum(told, 0.0)))  # of the covariance of what is estimated
         estimate = root @ (root.T @ np.concatenate([normal.slope for normal in equations]))
         amplitudes = [
             np.split(part, normal.offset_rows[1:])
