@@ -111,7 +111,8 @@ class InterpolatedSlopes:
 
     def products(self) -> FloatArray:
         """Products of the derivatives with each other, (n, n) array."""
-        stacked = self.columns.reshape(-1, self.columns.shape[2])
+        n_frfs, n_rows, n = self.columns.shape
+        stacked = self.columns.reshape(n_frfs * n_rows, n)
         products = stacked.T @ stacked
         for removed in self._removed():
             products -= removed.T @ removed
