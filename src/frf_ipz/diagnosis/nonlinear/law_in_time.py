@@ -63,7 +63,8 @@ def _with_response(
     nuisance_prior, nuisance = problem.linear.nuisance_prior.without_initial_states(fit.nuisance)
     alone = replace(data.training, records=(record,))
     simulation = simulate(alone, nuisance_prior, replace(fit, nuisance=nuisance), duration_s=problem.duration_s)
-    sizes = np.maximum(np.linalg.norm(simulation.measured[0], axis=1), np.finfo(float).tiny)
+    sizes = np.linalg.norm(simulation.measured[0], axis=1)
+    sizes = np.where(sizes > 0, sizes, np.inf)  # a channel that was left out of this record shows nothing
     row = int(np.argmax(np.linalg.norm(simulation.simulated[0] - simulation.without[0], axis=1) / sizes))
     sensor = nuisance_prior.modal_model.sensors[row]
     return replace(

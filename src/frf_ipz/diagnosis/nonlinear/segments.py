@@ -213,14 +213,18 @@ def cut_segments(
 def _noise_variance(
     modal_model: ModalModel, noise: ChannelNoise, s: ComplexArray, sigma: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Variances of `SegmentSet.motion`, (n_sensors, n_lines), and of `SegmentSet.force`, (n_lines,), by noise."""
+    """Variances of `SegmentSet.motion`, (n_sensors, n_lines), and of `SegmentSet.force`, (n_lines,), by noise.
+
+    Zero for sensors that no record has.
+    """
     frequency = np.maximum(s.imag, s[1].imag) / (2 * np.pi)
     energy = (1 - np.exp(-2 * WINDOW_DECAYS)) / (2 * sigma)
-    of_sensors = [
-        noise.response_energy(_noise_row(noise, sensor), frequency, energy) / np.abs(s) ** (2 * sensor.quantity.power)
-        for sensor in modal_model.sensors
-    ]
-    return np.array(of_sensors), noise.force_energy(frequency, energy)
+    of_sensors = np.zeros((len(modal_model.sensors), len(s)))
+    for row, sensor in enumerate(modal_model.sensors):
+        if (sensor.channel, sensor.dof) in noise.sensors:  # else no record has it
+            energies = noise.response_energy(_noise_row(noise, sensor), frequency, energy)
+            of_sensors[row] = energies / np.abs(s) ** (2 * sensor.quantity.power)
+    return of_sensors, noise.force_energy(frequency, energy)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -54,6 +54,17 @@ def test_noise_of_the_force_is_a_larger_part_of_a_weak_impact(chain, strike):
     assert part.max() > 10 * part.min()
 
 
+def test_a_sensor_that_no_record_has_is_known_with_no_certainty(chain, strike):
+    """One impact is looked at, in which a channel was overloaded; others have it."""
+    whole = strike()
+    modal_model, first = make_modal_model(chain.model, whole), whole.records[0]
+    without = replace(first, sensors=first.sensors[:1], responses=first.responses[:1])
+    alone = replace(whole, records=(without,))
+    segments = cut_segments(alone, modal_model, read_noise(alone), SegmentWindow(duration_s=1.0))
+    assert np.isfinite(segments.variance[:, 0]).all()
+    assert np.isinf(segments.variance[:, 1]).all()
+
+
 def test_no_segment_starts_where_the_motion_has_decayed(chain, strike, random_records):
     """A shaker that was running before the record, and stops half-way."""
     observations, begin, stop_s = random_records(strike(), 0.5), 120, 1.7
