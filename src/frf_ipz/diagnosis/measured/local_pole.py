@@ -74,7 +74,7 @@ def lines_of_one_number(s: ComplexArray, duration_s: float) -> float:
     Examples
     --------
     >>> import numpy as np
-    >>> lines_of_one_number(2j * np.pi * np.arange(10.0, 20.0, 0.25), 1.0)
+    >>> round(lines_of_one_number(2j * np.pi * np.arange(10.0, 20.0, 0.25), 1.0), 6)
     4.0
     """
     distance, rate = float(np.median(np.diff(s.imag))), 2 * float(s.real[0])
