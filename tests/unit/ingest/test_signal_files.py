@@ -182,6 +182,22 @@ def test_a_channel_of_an_mdf_file_beyond_its_records_is_refused(tmp_path, versio
         open_recording(written, ["force"], TableKeys())
 
 
+@pytest.mark.parametrize(("version", "block", "link"), [("4.10", b"##CG", (24, 8)), ("3.30", b"DG", (4, 4))])
+def test_an_mdf_file_whose_blocks_lead_round_in_a_circle_is_refused(tmp_path, version, block, link):
+    """A group names itself as the next one: the library would count for ever."""
+    asammdf = pytest.importorskip("asammdf")
+    values = np.arange(100.0)
+    with asammdf.MDF(version=version) as content:
+        content.append([asammdf.Signal(values, values / 100.0, name=name, unit="N") for name in ("force", "acc")])
+        written = content.save(tmp_path / "a.mdf", overwrite=True)
+    data = bytearray(written.read_bytes())
+    place, (offset, size) = data.index(block, 64), link
+    data[place + offset : place + offset + size] = place.to_bytes(size, "little")
+    written.write_bytes(data)
+    with pytest.raises(FileFormatError, match="lead round in a circle"):
+        open_recording(written, ["force"], TableKeys())
+
+
 def test_an_mdf_file_of_short_blocks_is_read(tmp_path):
     """As before version 3: channels without a further offset."""
     asammdf = pytest.importorskip("asammdf")

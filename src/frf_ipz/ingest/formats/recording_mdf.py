@@ -31,7 +31,33 @@ if TYPE_CHECKING:
 KIND = "an MDF file"
 LOSSES = ("is outside the file size", "offset too high")  # of the messages of asammdf: blocks that are not there
 BEYOND = "a formula or a table, and only factor and offset are read"
+MOST_SEEKS = 100_000  # in a small file; one that can be read takes some for each of its blocks
+SHORTEST_BLOCK = 4  # bytes of a file for each seek more: blocks are longer, and read a few times
 LINEAR = {"3": {0, 65535}, "4": {0, 1}}  # types of conversions: by factor and offset, or none
+
+
+class _BytesThatEnd(io.BytesIO):
+    """Bytes of a file, for a reader that would follow a circle of blocks for ever.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    data : bytes
+        All of it.
+    """
+
+    def __init__(self, path: Path, data: bytes) -> None:
+        super().__init__(data)
+        self._path = path
+        self._left = MOST_SEEKS + len(data) // SHORTEST_BLOCK
+
+    def seek(self, offset: int, whence: int = 0, /) -> int:
+        """Go to a place, as often as a file of this size may ask for it."""
+        self._left -= 1
+        if self._left < 0:
+            raise FileFormatError(self._path, "cannot be read: its blocks lead round in a circle; is it damaged?")
+        return super().seek(offset, whence)
 
 
 def _recognises(head: bytes) -> bool:
@@ -47,7 +73,7 @@ def _read(path: Path, keys: TableKeys) -> SignalTable:
     with (
         errors_of_reader(path, KIND, losses=LOSSES) as said,
         _dropping_half_made_files(),
-        asammdf.MDF(io.BytesIO(data)) as content,
+        asammdf.MDF(_BytesThatEnd(path, data)) as content,
     ):
         linear = LINEAR.get(content.version[0], set())
         sizes = [group.channel_group.cycles_nr * 8 * len(group.channels) for group in content.groups]
