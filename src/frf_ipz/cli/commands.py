@@ -167,7 +167,10 @@ def plot(
     name: Annotated[
         str | None, typer.Argument(metavar="NAME", help="Which picture; without it, all are named.")
     ] = None,
-    file_format: Annotated[str, typer.Option("--format", "-f", metavar="svg|pdf|png", help="Kind of file.")] = "svg",
+    file_format: Annotated[
+        str | None,
+        typer.Option("--format", "-f", metavar="svg|pdf|png", help="Kind of file; by the end of FILE, else svg."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="FILE", help="File to write; NAME.FORMAT here by default.")
     ] = None,

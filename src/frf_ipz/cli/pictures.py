@@ -34,7 +34,7 @@ def picture_list(folder: Path) -> str:
     return "\n".join([f"frf-ipz plot {folder} NAME, with one of the names", *names])
 
 
-def draw_picture(folder: Path, name: str, file_format: str, out: Path | None) -> str:
+def draw_picture(folder: Path, name: str, file_format: str | None, out: Path | None) -> str:
     """Draw a picture of a run into a file.
 
     Parameters
@@ -43,8 +43,8 @@ def draw_picture(folder: Path, name: str, file_format: str, out: Path | None) ->
         The run's folder.
     name : str
         Which picture.
-    file_format : str
-        ``svg``, ``pdf`` or ``png``.
+    file_format : str, optional
+        ``svg``, ``pdf`` or ``png``; where it is left out, what the name of the file ends with, or ``svg``.
     out : Path, optional
         File to write; the picture's name in the folder of work where it is left out.
 
@@ -56,16 +56,21 @@ def draw_picture(folder: Path, name: str, file_format: str, out: Path | None) ->
     Raises
     ------
     InputError
-        If there is no such run, picture or format, or the file cannot be written.
+        If there is no such run, picture or format, the name of the file ends as that of another, or it cannot be
+        written.
     """
-    if file_format not in FORMATS:
-        raise InputError(f"--format '{file_format}' is not known; {did_you_mean(file_format, FORMATS)}")
-    path = Path(f"{name}.{file_format}") if out is None else out
+    ending = "" if out is None else out.suffix.lower().removeprefix(".")
+    chosen = file_format or ending or "svg"
+    if chosen not in FORMATS:
+        raise InputError(f"the format '{chosen}' is not known; {did_you_mean(chosen, FORMATS)}")
+    if ending in FORMATS and ending != chosen:
+        raise InputError(f"--out {out} ends as .{ending}, and --format is {chosen}; leave one of them out")
+    path = Path(f"{name}.{chosen}") if out is None else out
     run = open_results(folder).load()
     with errors_of_results(folder):
         figure = draw_pictures(describe(name, run))
     try:
-        save_figure(figure, path, file_format=file_format)
+        save_figure(figure, path, file_format=chosen)
     except InputError as error:
         raise InputError(f"{error}; choose another --out") from None
     return f"wrote {path}"

@@ -49,6 +49,12 @@ def test_the_format_is_the_one_asked_for(call, out, tmp_path, kind):
     assert (tmp_path / "here").read_bytes().startswith(KINDS[kind])
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_format_is_that_of_the_name_of_the_file(call, out, tmp_path, kind):
+    assert call("plot", out, "poles", "--out", tmp_path / f"here.{kind.upper()}")[0] == 0
+    assert (tmp_path / f"here.{kind.upper()}").read_bytes().startswith(KINDS[kind])
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -56,6 +62,8 @@ def test_the_format_is_the_one_asked_for(call, out, tmp_path, kind):
         (("poles", "--format", "jpg"), "'jpg' is not known"),
         (("ranking",), "needs the result of 'diagnose'"),
         (("poles", "--out", "nowhere/poles.svg"), "cannot be written"),
+        (("poles", "--out", "poles.jpg"), "'jpg' is not known"),
+        (("poles", "--out", "poles.png", "--format", "svg"), "ends as .png, and --format is svg"),
     ],
     ids=str,
 )
