@@ -149,7 +149,7 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
     """
     progress(0.0, "choosing lines")
     lines = measured_lines(frfs, options)
-    late = _fit_late_responses(frfs, lines, options) if options.delay is None else None
+    late = _fit_late_responses(frfs, lines, options, progress) if options.delay is None else None
     if late is not None and np.median(late.misfit_ratio) < MODEL_ERROR:
         return late
     try:
@@ -165,7 +165,9 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
     return fitted
 
 
-def _fit_late_responses(frfs: FrfSet, lines: MeasuredLines, options: FitOptions) -> FittedModes | None:
+def _fit_late_responses(
+    frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progress: Progress
+) -> FittedModes | None:
     """Fit without a delay of periods, where the responses begin so much off the force; None where that is no better.
 
     It comes before all else, as enough poles describe any delay: of late responses they are modes that do not exist.
@@ -173,6 +175,7 @@ def _fit_late_responses(frfs: FrfSet, lines: MeasuredLines, options: FitOptions)
     arrivals_s = find_arrivals(lines)
     if not len(arrivals_s) or abs(arrivals_s[0]) * lines.band_hz[1] < FAR_OFF:
         return None
+    progress(0.02, "looking for responses that are far too late")
     _, misfit_without = _first_delay(frfs, lines, 0.0, options)
     trials = sorted((_first_delay(frfs, lines, float(first_s), options) for first_s in arrivals_s), key=itemgetter(1))
     best: tuple[float, FittedModes] | None = None

@@ -50,9 +50,7 @@ STATE_ERROR = 0.01  # of a mode's residual motion: impacts do not hit one exact 
 MODEL_ERROR = 0.003  # of a response: misfit by sampling and by the positions of impacts
 SMOOTHED_LINES = 11  # over which the energy that no FRF explains is averaged
 ROUNDS = 3  # of weights: in the first one residual motion counts as noise
-MOST_SAMPLES_BEFORE = (
-    1000  # an impact, the last, that are weighed: what they have in common limits what more would tell
-)
+MOST_SAMPLES_BEFORE = 1000  # an impact, the last, that are weighed: their noise is solved for together
 MIN_RECORDS = 2  # of a shaker in a group: a single one determines no offset
 STARTED = 0.02  # of a shaker's largest force: with more it has started
 MIN_SAMPLES_BEFORE = 4  # an impact, that show the residual motion
