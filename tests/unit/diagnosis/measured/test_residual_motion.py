@@ -196,6 +196,21 @@ def test_what_is_not_known_of_residual_motion_is_as_large_as_its_errors(successi
     assert np.all((ratio > 0.2) & (ratio < 2.0)), ratio
 
 
+def test_what_is_not_known_of_residual_motion_is_an_error_of_the_frfs(successive_impacts):
+    noisy, _ = successive_impacts(600, lambda number: number + 1, noise_part=3e-3)
+    restored = remove_residual_motion(noisy)
+    taken_as_known = replace(
+        restored, records=tuple(replace(record, residual_motion=None) for record in restored.records)
+    )
+    s = 15.0 + 2j * np.pi * np.linspace(5.0, 70.0, 14)
+    survey = survey_records(restored)
+    known = replace(survey, groups=survey_records(taken_as_known).groups)
+    uncertain, certain = (estimate_transfer_functions(one, s).covariance for one in (survey, known))
+    added = np.diagonal(uncertain - certain, axis1=1, axis2=2).real
+    assert np.all(added > 0)
+    assert np.all(np.linalg.eigvalsh(uncertain - certain)[:, 0] > -1e-9 * added.max(axis=1))
+
+
 def test_records_without_noise_are_no_obstacle(successive_impacts):
     """What they tell of some amplitudes exceeds what they tell of others by more than double precision holds."""
     exact, alone = successive_impacts(600, lambda number: number + 1, noise_part=0.0)
