@@ -108,6 +108,7 @@ class FileFormatError(InputError):
 
     def __init__(self, path: Path | str, problem: str, *, where: str = "") -> None:
         self.path = path
+        self.problem = problem
         self.where = where
         where = _without_middle(where, MOST_LETTERS // 8)
         super().__init__(f"{path}{f', {where}' if where else ''}: {_without_middle(problem, MOST_LETTERS)}")

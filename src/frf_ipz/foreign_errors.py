@@ -6,6 +6,7 @@ import importlib
 import logging
 import warnings
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -121,5 +122,32 @@ def import_reader(path: Path, module: str, *, kind: str, extra: str) -> Any:  # 
         with np.printoptions():  # some set NumPy's for all: numbers would lose digits wherever they become text
             return importlib.import_module(module)
     except ImportError:
-        problem = f"is {kind}, whose reader {module} is not installed; run: pip install 'frf_ipz[{extra}]'"
-        raise FileFormatError(path, f"{problem}, or export it in another format") from None
+        raise _without_reader(path, module, kind=kind, extra=extra) from None
+
+
+def require_reader(path: Path, module: str, *, kind: str, extra: str) -> None:
+    """Say how the library is installed that reads a kind of file in another process, if it is not.
+
+    Parameters
+    ----------
+    path : Path
+        The file that needs it.
+    module : str
+        Name of the library.
+    kind : str
+        What the file is, such as ``a mesh``.
+    extra : str
+        The extra of the package that installs it.
+
+    Raises
+    ------
+    FileFormatError
+        If it is not installed: names the extra.
+    """
+    if find_spec(module) is None:
+        raise _without_reader(path, module, kind=kind, extra=extra)
+
+
+def _without_reader(path: Path, module: str, *, kind: str, extra: str) -> FileFormatError:
+    problem = f"is {kind}, whose reader {module} is not installed; run: pip install 'frf_ipz[{extra}]'"
+    return FileFormatError(path, f"{problem}, or export it in another format")

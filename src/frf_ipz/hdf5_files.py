@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import lazy_loader
 import numpy as np
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader
-from frf_ipz.hdf5_heaps import require_heaps
-from frf_ipz.input_files import open_input, require_expanded
+from frf_ipz.input_files import require_expanded
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -124,13 +124,15 @@ class Hdf5Tree:
 
 
 @contextmanager
-def open_tree(path: Path, kind: str, *, most_bytes: int) -> Iterator[Hdf5Tree]:
-    """Open an HDF5 file.
+def open_tree(data: IO[bytes], path: Path, kind: str, *, most_bytes: int) -> Iterator[Hdf5Tree]:
+    """Open an HDF5 file, in a process that its library may end.
 
     Parameters
     ----------
-    path : Path
+    data : stream
         The file.
+    path : Path
+        Its name, for messages.
     kind : str
         What it should be, for messages.
     most_bytes : int
@@ -146,10 +148,9 @@ def open_tree(path: Path, kind: str, *, most_bytes: int) -> Iterator[Hdf5Tree]:
     FileFormatError
         If it is none, or is damaged.
     """
-    with open_input(path) as stream:
-        require_heaps(path, stream)
-        with errors_of_reader(path, kind), h5py.File(stream, "r") as file:
-            yield Hdf5Tree(path=path, file=file, file_bytes=path.stat().st_size, most_bytes=most_bytes)
+    file_bytes = data.seek(0, os.SEEK_END)
+    with errors_of_reader(path, kind), h5py.File(data, "r") as file:
+        yield Hdf5Tree(path=path, file=file, file_bytes=file_bytes, most_bytes=most_bytes)
 
 
 def texts_of(values: object) -> tuple[str, ...] | None:

@@ -5,8 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 
+from array_files import write_matlab_7_3
 from small_campaign import write_campaign
 
 MODULES_AT_START = 125  # of 620 in all: those of options, files, the model, and the first stage
@@ -18,9 +21,9 @@ NOT_AT_START = {
 SOURCE = Path(__file__).parents[2] / "src" / "frf_ipz"
 
 
-def modules_after(statement):
+def modules_after(statement, folder=None):
     code = f"import sys; {statement}; print('\\n'.join(sys.modules))"
-    return set(subprocess.check_output([sys.executable, "-c", code], text=True).split())
+    return set(subprocess.check_output([sys.executable, "-c", code], text=True, cwd=folder).split())
 
 
 def test_importing_the_package_leaves_heavy_packages_alone():
@@ -94,3 +97,15 @@ def test_imports_stand_at_the_top():
         if isinstance(node, ast.Import | ast.ImportFrom)
     ]
     assert not late
+
+
+def test_the_library_of_hdf5_is_loaded_in_no_process_of_the_user(tmp_path):
+    """A damaged file may end the process that reads it."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["frf"], file["f"] = np.full((3, 1, 1), 1 + 1j), np.arange(1.0, 4.0)
+    write_matlab_7_3(tmp_path / "a.mat", {"K": np.eye(2)})
+    read = "frf_ipz.read_frfs('a.h5', quantity='receptance', output='1:+z', input='1:+z')"
+    code = f"import frf_ipz; {read}; from pathlib import Path; from frf_ipz.fe.matrices.registry import read_matrix; "
+    code += "from frf_ipz.fe.matrices.stored import MatrixRequest; "
+    code += "read_matrix(MatrixRequest(path=Path('a.mat'), what='stiffness'))"
+    assert not [name for name in modules_after(code, folder=tmp_path) if name.startswith("h5py.")]

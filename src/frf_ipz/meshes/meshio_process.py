@@ -1,23 +1,35 @@
-"""Reads a mesh by meshio in a process of its own: ``python -m frf_ipz.meshes.meshio_process IN OUT``.
-
-On a file that is cut off, meshio may look for its end forever.
-"""
+"""Reads a mesh by meshio in a process of its own: on a file that is cut off, it may look for the end for ever."""
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from pathlib import Path
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.output_files import replacing
+from frf_ipz.reader_process import FileContents, as_file
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
-def main() -> None:
-    """Write points, and corners by the type of their elements, as a NumPy file."""
-    source, target = sys.argv[1:]
-    mesh = import_module("meshio").read(source)
+def read(data: IO[bytes], path: Path) -> FileContents:
+    """Read points, and corners by the type of their elements.
+
+    Parameters
+    ----------
+    data : stream
+        The file.
+    path : Path
+        Says by its end which format it is.
+
+    Returns
+    -------
+    FileContents
+        ``points`` [node, coordinate], and blocks of elements [element, corner] by ``NUMBER:TYPE``.
+    """
+    with as_file(data, path) as copy:
+        mesh = import_module("meshio").read(copy)
     points = np.zeros((len(mesh.points), 3))
     points[:, : np.shape(mesh.points)[1]] = mesh.points
     arrays = {"points": points}
@@ -25,9 +37,4 @@ def main() -> None:
         nodes = np.asarray(block.data)
         if nodes.ndim == 2:
             arrays[f"{place}:{block.type}"] = nodes.astype(np.int64)
-    with replacing(Path(target)) as beside, beside.open("wb") as stream:
-        np.savez(stream, **arrays)  # type: ignore[arg-type]
-
-
-if __name__ == "__main__":
-    main()
+    return FileContents(arrays=arrays)

@@ -7,6 +7,8 @@ import wave
 import zipfile
 
 import lvm_read
+import sys
+
 import numpy as np
 import openpyxl
 import pytest
@@ -151,11 +153,15 @@ def test_numbers_of_a_channel_and_rates_that_contradict(tmp_path):
         open_recording(tmp_path / "a.lvm", ["acc_3"])
 
 
-def test_a_missing_reader_names_its_extra(tmp_path, monkeypatch):
-    (tmp_path / "a.tdms").write_bytes(b"TDSm" + bytes(64))
-    monkeypatch.setitem(__import__("sys").modules, "nptdms", None)
-    with pytest.raises(InputError, match=r"pip install 'frf_ipz\[tdms\]'"):
-        look_at_recording(tmp_path / "a.tdms")
+@pytest.mark.parametrize(
+    ("name", "head", "reader", "extra"),
+    [("a.tdms", b"TDSm", "nptdms", "tdms"), ("a.mf4", b"MDF     ", "asammdf", "mdf")],
+)
+def test_a_missing_reader_names_its_extra(tmp_path, monkeypatch, name, head, reader, extra):
+    (tmp_path / name).write_bytes(head + bytes(64))
+    monkeypatch.setitem(sys.modules, reader, None)
+    with pytest.raises(InputError, match=rf"pip install 'frf_ipz\[{extra}\]'"):
+        look_at_recording(tmp_path / name)
 
 
 def test_a_formula_of_an_mdf_file_is_not_run(tmp_path):

@@ -1,29 +1,25 @@
-"""MATLAB files, versions 4 to 7.3: numbers, texts, structures and cells; objects only MATLAB itself can read.
-
-A file of version 7.3 is an HDF5 file in which structures are groups, cells are references, and axes stand in the
-opposite order.
-"""
+"""MATLAB files, versions 4 to 7.3: numbers, texts, structures and cells; objects only MATLAB itself can read."""
 
 from __future__ import annotations
 
 import struct
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import lazy_loader
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader
-from frf_ipz.hdf5_files import SIGNATURE, Hdf5Tree, open_tree
+from frf_ipz.hdf5_files import SIGNATURE
 from frf_ipz.ingest.formats.file_arrays import MOST_EXPANDED, ArrayFormat, FileArrays
 from frf_ipz.ingest.formats.text_layout import read_head
 from frf_ipz.input_files import require_regular_file
 from frf_ipz.late_imports import import_late
 from frf_ipz.matlab_files import read_matlab
+from frf_ipz.reader_process import read_in_process
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from scipy.io import matlab
@@ -32,12 +28,10 @@ if TYPE_CHECKING:
 else:
     matlab = import_late("scipy.io.matlab")
 
-h5py = lazy_loader.load("h5py")  # slow to load, and most recordings do not need it
-
 KIND = "a MATLAB file"
+PROCESS = "frf_ipz.ingest.formats.matlab_7_3_process"
 N_HEADER = 128  # bytes before the first element, from version 5 on
 HDF5_OFFSET = 512  # bytes before the HDF5 file in one of version 7.3
-DEEPEST = 32  # structures within structures
 MOST_ITEMS = 20_000  # arrays and texts; a recording has some hundred
 V4_BYTES = 20  # of the header of an array
 OBJECTS = "these are objects (tables, timetables, frd, idfrd and the like): in MATLAB save arrays, or s = struct(sys)"
@@ -63,8 +57,9 @@ def _is_version_4(head: bytes) -> bool:
 
 def _read(path: Path) -> FileArrays:
     if read_head(path)[HDF5_OFFSET : HDF5_OFFSET + len(SIGNATURE)] == SIGNATURE:
-        return _read_version_7_3(path)
-    found = _Found()
+        contents = read_in_process(path, PROCESS, kind=KIND, most_bytes=MOST_EXPANDED)
+        return MatlabContents(arrays=contents.arrays, **contents.said).as_arrays(path)
+    found = MatlabContents()
     size = require_regular_file(path)
     with errors_of_reader(path, KIND):
         values = read_matlab(path, most_bytes=max(MOST_EXPANDED, size))
@@ -80,18 +75,32 @@ FORMAT = ArrayFormat(rank=4, recognises=_recognises, read=_read)
 
 
 @dataclass(kw_only=True)
-class _Found:
-    """Numbers and texts, by their way through structures and cells."""
+class MatlabContents:
+    """Numbers and texts, by their way through structures and cells.
+
+    Parameters
+    ----------
+    arrays : dict of str to array
+        Numbers.
+    texts : dict of str to sequence of str
+        Texts, and lists of texts.
+    unread : list of str
+        What cannot be read.
+    has_objects : bool
+        What cannot be read are objects, some at least.
+    """
 
     arrays: dict[str, NumericArray] = field(default_factory=dict)
-    texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    texts: dict[str, Sequence[str]] = field(default_factory=dict)
     unread: list[str] = field(default_factory=list)
     has_objects: bool = False
 
     def as_arrays(self, path: Path) -> FileArrays:
+        """Give them as those of a file of arrays."""
         hint = (OBJECTS,) if self.has_objects else ()
+        texts = {place: tuple(lines) for place, lines in self.texts.items()}
         unread = (*dict.fromkeys(self.unread), *hint)
-        return FileArrays(path=path, arrays=self.arrays, texts=self.texts, counts_from_one=True, unread=unread)
+        return FileArrays(path=path, arrays=self.arrays, texts=texts, counts_from_one=True, unread=unread)
 
     def add(self, name: str, value: object) -> None:
         """Take a value as SciPy gives it."""
@@ -130,58 +139,3 @@ def _one_text(cell: object) -> str | None:
     if isinstance(cell, np.ndarray) and cell.dtype.kind in "US" and cell.size <= 1:
         return str(cell.ravel()[0]) if cell.size else ""
     return None
-
-
-def _read_version_7_3(path: Path) -> FileArrays:
-    found = _Found()
-    with open_tree(path, KIND, most_bytes=MOST_EXPANDED) as tree:
-        for name, member in tree.members(tree.file):
-            if not name.startswith("#"):
-                _take_7_3(tree, name, member, found, 0)
-    return found.as_arrays(path)
-
-
-def _take_7_3(tree: Hdf5Tree, name: str, member: Any, found: _Found, depth: int) -> None:  # noqa: ANN401 - of h5py
-    if depth > DEEPEST:
-        raise FileFormatError(tree.path, f"has structures more than {DEEPEST} deep; save the arrays themselves")
-    matlab_class = member.attrs.get("MATLAB_class", b"")
-    matlab_class = matlab_class.decode() if isinstance(matlab_class, bytes) else str(matlab_class)
-    if "MATLAB_object_decode" in member.attrs or matlab_class == "function_handle":
-        found.unread.append(name)
-        found.has_objects = True
-    elif isinstance(member, h5py.Group):
-        if "MATLAB_sparse" in member.attrs:
-            found.unread.append(name)
-            return
-        for part, content in tree.members(member):
-            _take_7_3(tree, f"{name}.{part}", content, found, depth + 1)
-    elif member.attrs.get("MATLAB_empty", 0):
-        return
-    elif h5py.check_ref_dtype(member.dtype) is not None:
-        _take_references(tree, name, member, found, depth)
-    elif matlab_class == "char":
-        rows = np.atleast_2d(tree.read(member).T)
-        found.texts[name] = tuple(row.astype(np.uint16).tobytes().decode("utf-16-le", "replace") for row in rows)
-    else:
-        values = tree.read(member)
-        if values.dtype.kind in "biufc":
-            found.arrays[name] = values.T
-
-
-def _take_references(tree: Hdf5Tree, name: str, member: Any, found: _Found, depth: int) -> None:  # noqa: ANN401
-    """Follow references: those of a cell, or of a field of an array of structures."""
-    is_cell = "MATLAB_class" in member.attrs
-    inner = _Found()
-    for number, reference in enumerate(tree.read(member).ravel(), start=1):
-        tree.count()
-        if reference:
-            way, _, part = name.rpartition(".")
-            place = f"{name}{{{number}}}" if is_cell or not way else f"{way}({number}).{part}"
-            _take_7_3(tree, place, tree.file[reference], inner, depth + 1)
-    if is_cell and inner.texts and not inner.arrays:
-        found.texts[name] = tuple(text for texts in inner.texts.values() for text in texts)
-    else:
-        found.texts |= inner.texts
-    found.arrays |= inner.arrays
-    found.unread += inner.unread
-    found.has_objects |= inner.has_objects

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.errors import FileFormatError
-from frf_ipz.foreign_errors import import_reader
+from frf_ipz.foreign_errors import require_reader
 from frf_ipz.input_files import read_bytes
 from frf_ipz.meshes.mesh_file import MOST_BYTES, MeshFormat, StoredMesh
 from frf_ipz.meshes.outer_faces import (
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 PROCESS = "frf_ipz.meshes.meshio_process"
-LONGEST_S = 60.0  # a million nodes take 8
 KIND = "a mesh"
 SUFFIXES = {".vtk", ".vtu", ".msh", ".mesh", ".meshb", ".su2", ".ugrid", ".avs"}
 SHAPES = {  # meshio's names without the number of nodes; corners stand before other nodes
@@ -42,10 +41,10 @@ SHAPES = {  # meshio's names without the number of nodes; corners stand before o
 
 
 def _read(path: Path) -> StoredMesh:
-    import_reader(path, "meshio", kind=KIND, extra="mesh")
+    require_reader(path, "meshio", kind=KIND, extra="mesh")
     if b"<!ENTITY" in read_bytes(path, most_bytes=MOST_BYTES):
         raise FileFormatError(path, "defines entities, which no mesh needs; export it again")
-    arrays = read_in_process(path, PROCESS, kind=KIND, most_bytes=MOST_BYTES, longest_s=LONGEST_S)
+    arrays = read_in_process(path, PROCESS, kind=KIND, most_bytes=MOST_BYTES).arrays
     positions = {node: (x, y, z) for node, (x, y, z) in enumerate(arrays["points"].tolist(), start=1)}
     elements = [
         (shape, tuple(node + 1 for node in nodes))

@@ -55,7 +55,7 @@ def _is_installed() -> bool:
 def _arrays(path: Path, digest: str) -> Any:  # noqa: ANN401 - named arrays
     """Let another process read the file: a damaged one ends it."""
     del digest
-    return read_in_process(path, PROCESS, kind="a .full file of Ansys", most_bytes=MOST_BYTES)
+    return read_in_process(path, PROCESS, kind="a .full file of Ansys", most_bytes=MOST_BYTES).arrays
 
 
 def _dofs(labels: Any) -> tuple[Dof, ...]:  # noqa: ANN401 - node and number of the DOF, from 0

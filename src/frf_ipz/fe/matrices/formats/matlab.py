@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import lazy_loader
 import numpy as np
 from scipy import sparse
 
+from frf_ipz.fe.matrices.matlab_7_3_process import COLUMNS, DATA, N_ROWS, ROWS
 from frf_ipz.fe.matrices.named_arrays import read_named
 from frf_ipz.fe.matrices.stored import MOST_BYTES, MatrixFormat, MatrixRequest, StoredMatrix
 from frf_ipz.foreign_errors import errors_of_reader
-from frf_ipz.hdf5_files import SIGNATURE, Hdf5Tree, open_tree
+from frf_ipz.hdf5_files import SIGNATURE
 from frf_ipz.input_files import open_input
 from frf_ipz.matlab_files import read_matlab
 from frf_ipz.numerics.compressed_places import require_places
+from frf_ipz.reader_process import read_in_process
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-h5py = lazy_loader.load("h5py")  # slow to load, and most models do not need it
-
 KIND = "a MATLAB file"
+PROCESS = "frf_ipz.fe.matrices.matlab_7_3_process"
 DEEPEST = 4  # structures within structures
 
 
@@ -37,9 +37,8 @@ def _read(request: MatrixRequest) -> StoredMatrix:
     with open_input(request.path) as stream:
         is_hdf5 = _is_hdf5(stream.read(520))
     if is_hdf5:
-        arrays = _arrays_of_hdf5(request.path)
         with errors_of_reader(request.path, KIND):
-            return read_named(arrays, request)
+            return read_named(_arrays_of_hdf5(request.path), request)
     variables = read_matlab(request.path, most_bytes=MOST_BYTES)
     with errors_of_reader(request.path, KIND):
         return read_named(_flattened("", variables, 0), request)
@@ -67,32 +66,16 @@ def _flattened(way: str, variables: dict[str, Any], depth: int) -> dict[str, Any
 
 
 def _arrays_of_hdf5(path: Path) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    with open_tree(path, "a MATLAB file of version 7.3", most_bytes=MOST_BYTES) as tree:
-        for name, member in tree.members(tree.file):
-            if name.startswith("#"):
-                continue
-            if isinstance(member, h5py.Dataset):
-                found[name] = _numbers(tree, member)
-            elif isinstance(member.get("data"), h5py.Dataset) and "jc" in member and "ir" in member:
-                found[name] = _sparse(tree, member)
+    arrays = read_in_process(path, PROCESS, kind=KIND, most_bytes=MOST_BYTES).arrays
+    found = {name: values for name, values in arrays.items() if "/" not in name}
+    for name in (way.removesuffix(ROWS) for way in arrays if way.endswith(ROWS)):
+        found[name] = _sparse(*(arrays[name + part] for part in (DATA, ROWS, COLUMNS, N_ROWS)))
     return found
 
 
-def _numbers(tree: Hdf5Tree, dataset: Any) -> Any:  # noqa: ANN401 - h5py has no types
-    """Give an array with its axes as MATLAB has them; texts as one text a row."""
-    values = tree.read(dataset).T
-    if dataset.attrs.get("MATLAB_class") == b"char" and values.dtype.kind in "iu":
-        return np.array(["".join(map(chr, row)) for row in np.atleast_2d(values)])
-    return values
-
-
-def _sparse(tree: Hdf5Tree, group: Any) -> Any:  # noqa: ANN401
+def _sparse(values: Any, rows: Any, columns: Any, n_rows: Any) -> Any:  # noqa: ANN401 - arrays of any numbers
     """Assemble a sparse matrix, whose places are checked first: SciPy trusts them."""
-    columns = np.asarray(tree.read(group["jc"]), np.int64).ravel()
-    n_rows = int(group.attrs["MATLAB_sparse"])
-    values = tree.read(group["data"]).ravel()
-    rows = np.asarray(tree.read(group["ir"]), np.int64).ravel()
-    matrix: Any = sparse.csc_array((values, rows, columns), shape=(n_rows, len(columns) - 1))
+    shape = (int(n_rows), len(columns) - 1)
+    matrix: Any = sparse.csc_array((values, np.asarray(rows, np.int64), np.asarray(columns, np.int64)), shape=shape)
     require_places(matrix)
     return sparse.csr_array(matrix)
