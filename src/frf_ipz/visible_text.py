@@ -1,4 +1,4 @@
-"""Text that may come from anybody, made safe to show: what a terminal would obey is written out instead.
+"""Text that people read: what a terminal would obey is written out, and so are numbers of a few digits.
 
 Names come from files. An escape sequence in one could clear the screen, write to the clipboard or hide a line, a
 bidirectional control could show a name as another, and a line feed could add a line that nobody said.
@@ -6,10 +6,12 @@ bidirectional control could show a name as another, and a line feed could add a 
 
 from __future__ import annotations
 
+import re
 import unicodedata
 
 JOINERS = frozenset("\u200c\u200d\u00ad")  # of scripts and pictographs; they move nothing
 OBEYED = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})  # controls, formats, half a pair of code units, ends of lines
+ROUNDED = re.compile(r"(?<![\w.])\d(?:\.\d+)?e\+0[1-5](?!\w|\.\w)")  # to few digits, and short when written out
 
 
 def one_line(text: str) -> str:
@@ -56,6 +58,27 @@ def lines(text: str) -> str:
     'first\\r\\x07\n\tsecond'
     """
     return "\n".join("\t".join(map(one_line, line.split("\t"))) for line in text.split("\n"))
+
+
+def written_out(text: str) -> str:
+    """Write out numbers that were rounded to a few digits.
+
+    Parameters
+    ----------
+    text : str
+        With numbers such as ``1.2e+02``.
+
+    Returns
+    -------
+    str
+        With ``120``.
+
+    Examples
+    --------
+    >>> written_out("420 dB is 4.2e+02 dB; 4.2e+09 N/m stays")
+    '420 dB is 420 dB; 4.2e+09 N/m stays'
+    """
+    return ROUNDED.sub(lambda match: f"{float(match[0]):.0f}", text)
 
 
 def _shown(letter: str) -> str:

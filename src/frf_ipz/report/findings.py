@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.result import confidence
+from frf_ipz.visible_text import written_out
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Diagnosis
 
-ROUNDED = re.compile(r"\b\d(?:\.\d+)?e\+0[1-5]\b")  # rounded to few digits, and short when written out
 SENTENCES = {
     "consistent": "Nothing significant is missing from the model.",
     "unexplained": "Something is missing from the model that nothing in the catalogue explains.",
@@ -74,7 +73,7 @@ def typeset(text: str) -> str:
     str
         With the sign for plus or minus, and 120.
     """
-    return ROUNDED.sub(lambda match: f"{float(match[0]):.0f}", text.replace("+-", "±"))
+    return written_out(text.replace("+-", "±"))
 
 
 def card_texts(diagnosis: Diagnosis) -> tuple[str, str]:

@@ -13,6 +13,8 @@ from importlib.resources import files
 
 from jinja2 import Environment, PackageLoader, PrefixLoader, StrictUndefined
 
+from frf_ipz.visible_text import written_out
+
 REPORT = "frf_ipz.report"
 PLOTLY = "plotly-cartesian.min.js"
 SCRIPTS = (PLOTLY, "page.js")  # of a page with pictures, in the order in which they run
@@ -43,6 +45,7 @@ def page_environment(*packages: str) -> Environment:
         keep_trailing_newline=True,
     )
     environment.tests["numeric"] = _is_numeric
+    environment.filters["written_out"] = written_out
     environment.policies["json.dumps_kwargs"] = {
         "ensure_ascii": False,
         "separators": (",", ":"),

@@ -8,7 +8,7 @@ import numpy as np
 
 from frf_ipz.rational import natural_frequency_hz
 from frf_ipz.runs.figures import coherence_text, deviation_of
-from frf_ipz.visible_text import one_line
+from frf_ipz.visible_text import one_line, written_out
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -76,6 +76,7 @@ def summarise(results: Results) -> str:
     lines += [f"{title:<12}{text}" for title, text in note_lines(notes, has_page=has_page)]
     mended = results.manifest.get("notes", [])
     lines += [f"{'' if place else 'mended':<12}{note}" for place, note in enumerate(mended)]
+    lines[1:] = map(written_out, lines[1:])
     seconds = sum(entry.get("seconds", 0.0) for entry in results.manifest.get("stages", {}).values())
     lines.append(f"{'results':<12}{results.path or 'in memory'}  ({seconds:.1f} s of computing)")
     if results.path is not None and has_page:

@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from frf_ipz.assessment.assessment import Assessment, Check, Verdict
 from frf_ipz.diagnosis.result import as_appearance
+from frf_ipz.report.page import write_report
 from frf_ipz.report.section import Cards
 from frf_ipz.report.sections import frfs as frf_section
 from frf_ipz.report.sections import overview, pairing
@@ -91,6 +93,21 @@ def test_few_notes_stand_on_the_first_screen_and_the_rest_is_counted_where_it_is
     assert len(notes) == MOST_NOTES
     (rest,) = [line.strip() for line in lines if "more notes" in line]
     assert rest == "and 5 more notes in the report: 1 under Pairing, 4 under Points of interest"
+
+
+def test_numbers_of_a_few_digits_are_written_out_in_the_terminal_and_on_the_page(run, tmp_path):
+    fit = replace(run.fit, warnings=("the misfit is 4.2e+02 times the noise",))
+    check = Check(
+        name="phase", verdict=Verdict.NOT_USABLE, figure=180.0, limit=5.0, unit="deg", says="1.8e+02 degrees off"
+    )
+    loud = with_results(run, fit=fit, assessment=Assessment(verdict=check.verdict, checks=(check,)))
+    assert "  note      the misfit is 420 times the noise\n" in loud.summary()
+    assert "because     180 degrees off" in loud.summary()
+    write_report(loud, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "the misfit is 420 times the noise" in page
+    assert "180 degrees off" in page
+    assert "1.8e+02" not in page
 
 
 def test_few_predictions_stand_there_the_widest_first(run):

@@ -14,6 +14,7 @@ from frf_ipz.report.findings import card_texts, verdict_of
 from frf_ipz.report.section import Card, Cards, Headline, Section, Table, run_figures
 from frf_ipz.runs.figures import coherence_text, deviation_of
 from frf_ipz.runs.picture_data import update_targets
+from frf_ipz.visible_text import written_out
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -112,7 +113,7 @@ def assessment_sentence(assessment: Assessment) -> str:
     if cause is not None:
         return f"{word}: most likely {cause.says} ({cause.place})."
     costly = assessment.costly
-    return f"{word}: {costly[0].says}." if costly else f"{word}: all checks are within their limits."
+    return written_out(f"{word}: {costly[0].says}.") if costly else f"{word}: all checks are within their limits."
 
 
 def _is_said(assessment: Assessment | None, name: str) -> bool:
@@ -153,7 +154,7 @@ def _words(check: Check) -> str:
     """Say what costs the verdict, or was not looked at, and what to do; figures say enough of the others."""
     if check.verdict is Verdict.USABLE and check.is_answered:
         return ""
-    return f"{check.says}: {check.advice}" if check.advice else check.says
+    return written_out(f"{check.says}: {check.advice}" if check.advice else check.says)
 
 
 def _figure(value: float, unit: str) -> str:
@@ -218,7 +219,7 @@ def _deviation_card(run: Results) -> Card:
         why = "no FRF was measured" if run.frfs is None else "no FRF stands above its noise"
         return Card("Error at the measured points", "unknown", why)
     figures = [deviation.nominal_db, deviation.updated_db, deviation.with_causes_db]
-    figure = " → ".join(f"{value:.2g}" for value in figures if np.isfinite(value)) + " dB"
+    figure = written_out(" → ".join(f"{value:.2g}" for value in figures if np.isfinite(value)) + " dB")
     names = "before updating, after" + (", with the causes in the model" if np.isfinite(figures[2]) else "")
     meaning = f"{names}; median of {deviation.where}, {deviation.described}"
     if deviation.at == POINTS:
@@ -226,7 +227,7 @@ def _deviation_card(run: Results) -> Card:
     meaning += "; unknown gains are fitted" if run.frfs is not None and run.frfs.unknown_scale != "none" else ""
     together = [check for check in run.assessment.checks if check.name == TOGETHER] if run.assessment else []
     if together and together[0].where == ALL_FRFS:
-        meaning += f"; all together: {together[0].limit:.2g} → {together[0].figure:.2g} dB"
+        meaning += written_out(f"; all together: {together[0].limit:.2g} → {together[0].figure:.2g} dB")
     meaning += "; nothing was measured at the points of interest" if run.points else ""
     return Card("Error at the measured points", figure, meaning)
 
