@@ -78,6 +78,11 @@ class Evidence(MeasuredPoints):
     test_file: str = "test.toml"
     model_file: str = "model.toml"
 
+    @property
+    def has_targets(self) -> bool:
+        """The update had a measured pole or zero with a counterpart to go by."""
+        return bool(len(self.updated_model.after))
+
     @cached_property
     def deviation(self) -> FrfDeviation | None:
         """How far the models are from the measured FRFs; None where nothing stands above the noise."""

@@ -246,6 +246,15 @@ def test_an_update_without_targets_is_no_use(evidence):
     assert the(quality.targets, replace(evidence, updated_model=nothing)).verdict is NOT_USABLE
 
 
+def test_the_sign_of_another_structure_is_not_told(evidence):
+    """Below its modes a structure moves against the force, above with it: no sensor stands the other way round."""
+    nothing = replace(evidence.updated_model, before=np.zeros(0, complex), after=np.zeros(0, complex))
+    check = the(agreement.phase, with_frf(replace(evidence, updated_model=nothing), 2, -1.0))
+    assert check.verdict is NOT_USABLE
+    assert "reversed" not in check.says
+    assert check.advice == ""
+
+
 def relative_run(evidence, kind, factors):
     """The run of a test that does not know its scale, with its FRFs times some factors."""
     frfs = replace(

@@ -120,7 +120,7 @@ def phase(evidence: Evidence) -> Iterator[Check]:
     if verdict is not Verdict.USABLE and is_late:
         says += f"; a delay of {1e3 * delay_s:.2g} ms that all FRFs have in common explains most of it"
         advice = "correct what makes the responses late or early (filters, trigger), or set [fit] delay = true"
-    elif np.nansum(np.where(evidence.is_heard, turned, 0)[:, worst]).real < 0:
+    elif evidence.has_targets and np.nansum(np.where(evidence.is_heard, turned, 0)[:, worst]).real < 0:
         says += ": its sign is reversed"
         advice = f"turn the sign of the sensor's or the input's dof of {where}"
     yield Check(

@@ -149,7 +149,7 @@ def targets(evidence: Evidence) -> Iterator[Check]:
     Check
         One, where there was no target.
     """
-    if not len(evidence.updated_model.after):
+    if not evidence.has_targets:
         yield Check(
             name="targets of the update",
             verdict=Verdict.NOT_USABLE,
