@@ -275,6 +275,23 @@ def test_a_mode_just_inside_the_band_may_have_been_measured_just_outside(fit):
     assert below - far_above > 4
 
 
+@pytest.mark.parametrize(
+    ("system", "factor"), [("mm-t-s", 1e3), ("in-lbf-s", 4.4482216152605 / 0.0254)]
+)  # stiffness of translations in N/m, mass in kg
+def test_the_system_of_units_of_matrices_is_named_and_each_file(fit, system, factor):
+    """Responses in a unit as much too small would look the same: both files are named with their keys."""
+    beam = frf_ipz.make_beam(**BEAM)
+    model = frf_ipz.StructuralModel.from_matrices(
+        beam.mass / factor, beam.stiffness / factor, dofs=beam.dofs, modal_damping=BEAM["modal_ratio"]
+    )
+    files = {"test_file": "test.toml", "model_file": "model.toml"}
+    cause = likely_cause(measure(), fit, model, is_recorded=False, **files)
+    assert f'the matrices seem to be written in {system}: set units = "{system}" under [model]' in cause.says
+    places = f"{cause.file}, {cause.line_or_key}".split("; or ")
+    number = places.index("model.toml, [model] units")
+    assert all(place.startswith("test.toml, ") for place in places[number + 1 : number + 2])
+
+
 def test_the_time_in_ms_is_named(fit):
     cause = cause_of(fit, frequency_factor=1e-3)
     assert "time is in ms" in cause.says

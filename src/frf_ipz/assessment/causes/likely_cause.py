@@ -124,7 +124,10 @@ def _worded(causes: list[Cause], probability: np.ndarray) -> LikelyCause:
         for place in order[1:]
         if probability[place] > probability[order[0]] / np.e and causes[place].line_or_key != best.line_or_key
     ]
-    keys = dict.fromkeys(cause.line_or_key for cause in (best, *alike))
+    keys = {cause.line_or_key: cause.file for cause in (best, *alike)}
     total = sum(probability[place] for place, cause in enumerate(causes) if cause.line_or_key in keys)
     says = best.says + "".join(f"; or {cause.says}" for cause in alike)
-    return LikelyCause(says=says, file=best.file, line_or_key="; or ".join(keys), probability=float(min(total, 1.0)))
+    files = list(keys.values())
+    named = ["" if file == before else f"{file}, " for before, file in zip([best.file, *files], files, strict=False)]
+    places = "; or ".join(file + key for file, key in zip(named, keys, strict=True))
+    return LikelyCause(says=says, file=best.file, line_or_key=places, probability=float(min(total, 1.0)))

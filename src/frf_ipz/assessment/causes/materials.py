@@ -42,6 +42,10 @@ class Number:
         What it has to be multiplied by where it was written in a wrong unit, and in which.
     numbers : tuple of str
         Its keys in a beam: on springs, point masses, shear and rotary inertia the powers do not hold.
+    is_plural : bool
+        `what` is several.
+    is_system : bool
+        The units are systems, which ``[model] units`` names: rows of rotations have another factor.
     """
 
     key: str
@@ -50,6 +54,14 @@ class Number:
     mass_power: float
     units: tuple[tuple[float, str], ...]
     numbers: tuple[str, ...] = ()
+    is_plural: bool = False
+    is_system: bool = False
+
+    def written_in(self, unit: str, factor: float) -> str:
+        """Say that it is written in a unit, and what to do."""
+        seem, them = ("seem", "them") if self.is_plural else ("seems", "it")
+        remedy = f'set units = "{unit}" under [model]' if self.is_system else f"multiply {them} by {factor:g}"
+        return f"{self.what} {seem} to be written in {unit}: {remedy}"
 
 
 PASCAL = ((1e9, "GPa"), (1e6, "MPa (N/mm^2)"), (1e3, "kPa"))
@@ -100,6 +112,7 @@ NUMBERS = {
         Number(
             key="[beam] length_m, width_m, thickness_m",
             what="all dimensions",
+            is_plural=True,
             numbers=("length_m", "width_m", "thickness_m"),
             stiffness_power=1,
             mass_power=3,
@@ -138,11 +151,13 @@ NUMBERS = {
             units=((1e3, "N/mm"), (1e6, "kN/mm")),
         ),
         Number(
-            key="[model] units: mass and stiffness",
+            key="[model] units",
             what="the matrices",
+            is_plural=True,
+            is_system=True,
             stiffness_power=1,
             mass_power=1,
-            units=((1e3, "mm, t, s"), (175.12683524647636, "in, lbf, s")),
+            units=((1e3, "mm-t-s"), (175.12683524647636, "in-lbf-s")),
         ),
     ),
 }
@@ -165,7 +180,7 @@ def wrong_units(situation: Situation) -> Iterator[Cause]:
     count = sum(len(number.units) for number in numbers)
     for number in numbers:
         for factor, unit in number.units:
-            says = f"{number.what} seems to be written in {unit}: multiply it by {factor:g}"
+            says = number.written_in(unit, factor)
             scaled = _scaled(situation, number, factor, says, -float(np.log(count)))
             cause = _rebuilt(scaled, situation, number.numbers, factor) if number.numbers else scaled
             common = scaled.frequency_factor
