@@ -100,6 +100,15 @@ def add_to_test(path, lines):
     path.write_text(path.read_text(encoding="utf-8").replace("[test]", f"[test]\n{lines}", 1), encoding="utf-8")
 
 
+@pytest.mark.parametrize("dof", ['dof = "7:+z"', 'dof = "2:+z"', 'acc_2 = "5:-y"'])
+def test_nothing_is_measured_at_the_ground(roving, dof):
+    key, _, label = dof.partition(" = ")
+    text = roving.read_text(encoding="utf-8")
+    roving.write_text(text.replace(dof, f'{key} = "0:{label[3:]}', 1), encoding="utf-8")
+    with pytest.raises(FileFormatError, match=r"test.toml, .*'0:..' is at node 0, which is the ground; name the node"):
+        read_test(roving)
+
+
 def test_a_test_without_a_name_is_called_after_its_folder(tmp_path):
     path = hammer_campaign(tmp_path / "shelf", heights=(100.0,), n_samples=256)
     assert read_test(path).name == "shelf"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from frf_ipz.dofs import Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest import formats
 from frf_ipz.ingest.formats.file_arrays import ArrayFormat
@@ -16,6 +17,7 @@ from frf_ipz.ingest.formats.frf_file import FrfFormat
 from frf_ipz.ingest.formats.modes_file import ModesFormat
 from frf_ipz.ingest.formats.recording import LARGEST, RecordingFormat, TableKeys
 from frf_ipz.ingest.formats.text_layout import read_head
+from frf_ipz.structure import GROUND
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,6 +82,7 @@ def read_frf_file(source: FrfSource) -> tuple[MeasuredFrf, ...]:
         if candidate.holds(source, head):
             frfs: tuple[MeasuredFrf, ...] = candidate.read(source)
             for frf in frfs:
+                _require_motion(frf)
                 _require_sizes(frf)
             return frfs
     raise FileFormatError(
@@ -206,6 +209,14 @@ def read_modes_file(source: ModesSource) -> ModalParameters:
         "is of no known format for modes; expected is a universal file with data sets 55 or 2414, or a CSV with the "
         "columns mode,frequency_hz,damping_ratio,dof,real,imag",
     )
+
+
+def _require_motion(frf: MeasuredFrf) -> None:
+    """Refuse FRFs of the ground."""
+    for dof in (frf.output_dof, frf.input_dof):
+        if isinstance(dof, Dof) and dof.node == GROUND:
+            problem = f"holds the FRF {frf.output_dof} / {frf.input_dof}, and node {GROUND} is the ground"
+            raise FileFormatError(frf.source.path, f"{problem}; name the nodes of the sensor and of the force")
 
 
 def _require_sizes(frf: MeasuredFrf) -> None:
