@@ -186,6 +186,15 @@ def test_time_stamps_are_read(tmp_path, form):
     np.testing.assert_allclose(table[:, 1:].T, SIGNALS, rtol=DIGITS)
 
 
+@pytest.mark.parametrize("factor", [1, 1e3, 1e6, 1e9], ids=["s", "ms", "us", "ns"])
+def test_times_since_1970_are_read_in_the_unit_that_makes_them_dates(tmp_path, factor):
+    since_1970 = lines_with(
+        lambda number, fields: ",".join([f"{1762163939 * factor + number / RATE_HZ * factor:.6f}", *fields[1:]])
+    )
+    table = read(write(tmp_path, lambda text: named("Timestamp")(since_1970(text))))
+    np.testing.assert_allclose(table[:, 0] - table[0, 0], np.arange(N_SAMPLES) / RATE_HZ, atol=1.1 * PRINTED_S, rtol=0)
+
+
 def test_stamps_of_too_few_digits_need_a_rate(tmp_path):
     coarse = stamped(lambda minutes, seconds: f"10:{51 + minutes}:{int(1e3 * seconds) / 1e3:06.3f}")
     path = write(tmp_path, coarse)
@@ -214,8 +223,9 @@ def test_text_among_the_numbers_is_refused(tmp_path):
         "free text, with commas\n" * 5000,
         "2048\n3\n",
         "Date,27/03/2025,x,y\n",
+        "Channel,Input,Range,Coupling\n1,Dev1/ai0,5 V,IEPE\n2,Dev1/ai1,5 V,IEPE\n",
     ],
-    ids=["pairs", "sentences", "comments", "long", "numbers", "as wide as the table"],
+    ids=["pairs", "sentences", "comments", "long", "numbers", "as wide as the table", "table of channels"],
 )
 def test_text_above_the_names_is_left_out(tmp_path, preamble):
     expect(read(write(tmp_path, lambda text: preamble + text)))

@@ -28,6 +28,8 @@ EVEN = 0.02  # of the step between printed times: twice what the contract allows
 LETTERS_SHOWN, NAMES_SHOWN = 40, 10  # of names of columns, in a message
 FEWEST_ROWS = 3  # two steps can be compared
 DAY_S = 86400.0
+YEAR_2000_S, YEAR_2100_S = 946684800.0, 4102444800.0  # since 1970
+EPOCH_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 TIME = re.compile(
     r"^(elapsed|relative|abs(olute)?)?[ _]*(t|time|zeit|temps|tempo|tiempo|tid|tijd|x[ _-]?value|x[ _-]?axis|"
     r"seconds?|secs?|timestamp|zeitstempel|date ?time|milliseconds?|microseconds?)(?![a-z])",
@@ -94,7 +96,7 @@ def find_columns(layout: TextLayout, keys: TableKeys, *, columns: Sequence[str] 
         time = _find_time(layout, names, units, taken, counts_samples=counts_samples)
     holds_stamps = time is not None and is_stamp(layout.rows[0][time])
     if time is not None:
-        units[time] = "s" if holds_stamps else units[time] or _unit_of_time(names[time])
+        units[time] = "s" if holds_stamps else units[time] or _unit_of_time(names[time]) or _unit_of_epoch(layout, time)
     return TextColumns(
         names=tuple(names), units=tuple(units), time=time, counts_samples=counts_samples, holds_stamps=holds_stamps
     )
@@ -299,6 +301,12 @@ def _column(layout: TextLayout, index: int) -> FloatArray:
 def _is_time_unit(unit: str) -> bool:
     """Tell a unit that may be of time from one that is of something else."""
     return not (is_unit(unit) and not TIME_UNIT.search(unit.strip()))
+
+
+def _unit_of_epoch(layout: TextLayout, index: int) -> str:
+    """Find the unit of times since 1970, which are dates of this century in one unit only."""
+    first = next(iter(_column(layout, index)), 0.0)
+    return next((unit for unit, factor in EPOCH_UNITS.items() if YEAR_2000_S <= first * factor < YEAR_2100_S), "")
 
 
 def _unit_of_time(name: str) -> str:

@@ -332,11 +332,24 @@ def _begins_row(field: str) -> bool:
     return is_number(field) or is_stamp(field) or ONLY_DATE.fullmatch(field) is not None
 
 
+def _is_entry(field: str) -> bool:
+    return _begins_row(field) or text_numbers.is_not_finite(field)
+
+
 def _first_row(kept: Sequence[int], split: dict[int, list[str]]) -> int | None:
-    """Find the first line of numbers: the next one begins with a number and has as many fields."""
+    """Find the first line of numbers: the next one begins with a number and has as many fields.
+
+    A line above it that begins with a number, but has fewer numbers and text below it, is one of the text.
+    """
     begins = [index for index in kept if _begins_row(split[index][0])]
     widths = Counter(len(split[index]) for index in begins)
     usual = max(widths, key=lambda width: widths[width], default=0)
+    numbers = {index: sum(map(_is_entry, split[index])) for index in begins if len(split[index]) == usual}
+    counts = Counter(numbers.values())
+    most = max(counts, key=lambda count: counts[count], default=0)
+    whole = next((index for index in numbers if numbers[index] >= most), -1)
+    text = max((index for index in kept if index < whole and index not in numbers), default=-1)
+    begins = [index for index in begins if index > text]
     following = dict(pairwise(kept))
     for index in begins:
         below = split.get(following.get(index, -1))
