@@ -62,6 +62,15 @@ def test_a_structure_of_an_idfrd_object(tmp_path, name):
     expect(read(tmp_path / name, output=None, input=None))
 
 
+def test_frequencies_in_the_order_of_a_transform(tmp_path):
+    two_sided = np.concatenate([FRFS[:1].real, FRFS, FRFS[::-1].conj()])
+    frequency_hz = np.concatenate([[0.0], LINES_HZ, -LINES_HZ[::-1]])
+    np.savez(tmp_path / "frf.npz", frequency_hz=frequency_hz, frf=two_sided)
+    frfs = read(tmp_path / "frf.npz")
+    np.testing.assert_array_equal(frfs.frequency_hz, np.concatenate([[0.0], LINES_HZ]))
+    np.testing.assert_allclose(frfs.values[1:], FRFS.reshape(len(FRFS), -1), rtol=1e-12)
+
+
 def test_an_unknown_unit_of_frequencies_names_the_file(tmp_path):
     system = {"ResponseData": np.moveaxis(FRFS, 0, 2), "Frequency": LINES_HZ[:, None], "FrequencyUnit": "rad/TimeU"}
     scipy.io.savemat(tmp_path / "a.mat", {"sys": system})

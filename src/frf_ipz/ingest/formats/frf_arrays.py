@@ -382,7 +382,7 @@ def _find_frequencies(
     for name, array in arrays.arrays.items():
         flat = np.squeeze(array)
         fits = flat.ndim == 1 and len(flat) in shape and len(flat) >= FEWEST_LINES and not np.iscomplexobj(flat)
-        if fits and (np.diff(flat) > 0).all() and flat[0] >= 0:
+        if fits and _ascends(flat):
             vectors[name] = np.asarray(flat, np.float64)
     for pattern, factor in ((FREQUENCY, 1.0), (ANGULAR, FREQUENCIES["frequency_rad_s"])):
         for name, vector in vectors.items():
@@ -391,6 +391,13 @@ def _find_frequencies(
     if len(vectors) == 1:
         return next(iter(vectors.items()))
     return _lines_of_transform(arrays, shape) or _lines_by_step(arrays, shape)
+
+
+def _ascends(vector: NumericArray) -> bool:
+    """Tell whether frequencies ascend: from 0 or above, or over both sides, in the order of a transform too."""
+    ordered = np.fft.fftshift(vector) if vector[0] == 0 and vector[-1] < 0 else vector
+    is_two_sided = bool(ordered[0] < 0 < ordered[-1] <= -ordered[0])
+    return bool((np.diff(ordered) > 0).all()) and (bool(ordered[0] >= 0) or is_two_sided)
 
 
 def _lines_of_transform(arrays: FileArrays, shape: tuple[int, ...]) -> tuple[str, FloatArray] | None:
