@@ -80,6 +80,12 @@ def test_init_of_frfs_writes_a_test_of_their_kind(tmp_path):
     assert read_test(tmp_path / "test.toml").kind == "frf"
 
 
+def test_init_takes_magnitudes_for_no_recording(tmp_path):
+    (tmp_path / "mag.csv").write_text("Frequency [Hz];Magnitude [m/N]\n" + "".join(f"{n};0.5\n" for n in range(99)))
+    with pytest.raises(InputError, match=r"mag\.csv: its header names frequencies and magnitudes, without a phase"):
+        write_starting_files(tmp_path)
+
+
 def test_init_of_an_empty_folder_says_so(tmp_path):
     with pytest.raises(InputError, match="no recordings and no FRFs in a format that is read"):
         write_starting_files(tmp_path)

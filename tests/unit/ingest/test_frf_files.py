@@ -181,6 +181,15 @@ def test_a_line_that_stands_there_twice_is_named(tmp_path):
     assert re.search(r"frf\.csv, line 6, column 'frequency_hz': .* a second time, after line 5", says)
 
 
+@pytest.mark.parametrize("name", ["Magnitude [m/N]", "Amplitude dB", "Abs (m/s²/N)"])
+def test_text_with_magnitudes_only(tmp_path, name):
+    header = f"Frequency [Hz];{name};Coherence"
+    columns = np.column_stack([LINES_HZ, np.abs(VALUES[:, 0]), np.ones(len(LINES_HZ))])
+    np.savetxt(tmp_path / "frf.txt", columns, fmt="%.9e", delimiter=";", header=header, comments="", encoding="utf-8")
+    text = message(tmp_path, entry("frf.txt", output_dof="1:+z", input_dof="1:+z"))
+    assert re.search(r"frf\.txt: its header names frequencies and magnitudes, without a phase.*export real", text), text
+
+
 def test_columns_may_be_skipped(tmp_path):
     text_file(tmp_path, [LINES_HZ, LINES_HZ, VALUES[:, 0].imag, np.full(len(LINES_HZ), 0.5), VALUES[:, 0].real])
     frfs = read(tmp_path, text_entry(["frequency_hz", "skip", "imag", "coherence", "real"])).frfs
@@ -310,7 +319,7 @@ def test_values_that_cannot_be(tmp_path):
         (lambda: entry("absent.csv"), r"absent\.csv: there is no such file"),
         (lambda: entry(quantity="inertance"), "quantity.*receptance.*mobility.*accelerance"),
         (lambda: entry(unit="m/N"), "'m/N' is no unit of accelerance; expected is a unit like m/s\\^2/N"),
-        (lambda: entry(unit="quark"), "'quark' is no unit that can be read"),
+        (lambda: entry(unit="quark"), "frf.csv: the 'unit' of its ..frf..: 'quark' is no unit that can be read"),
         (lambda: text_entry(["frequency_hz", "real", "imagin"]), "'columns' names 'imagin'; did you mean 'imag'"),
         (lambda: text_entry(["frequency_hz", "real"]), "needed are frequency_hz .* and either real and imag"),
         (lambda: text_entry(["frequency_hz", "real", "imag", "coherence"]), "has 3 columns, but 'columns'.*names 4"),
@@ -339,6 +348,12 @@ def test_files_without_common_lines(tmp_path):
     long_csv(tmp_path, name="b.csv", outputs=("2:+z",), lines_hz=LINES_HZ * 1.37)
     text = message(tmp_path, entry(), entry("b.csv"))
     assert re.search(r"b\.csv: the lines of 2:.* are not those of 1:.* in frf\.csv", text), text
+
+
+def test_frfs_of_the_ground_are_refused(tmp_path):
+    long_csv(tmp_path, outputs=("1:+z", "0:+z"))
+    text = message(tmp_path, entry())
+    assert re.search(r"frf\.csv: holds the FRF 0:\+z / .*, and node 0 is the ground; name the nodes", text), text
 
 
 def test_a_channel_in_a_test_of_frfs(tmp_path):

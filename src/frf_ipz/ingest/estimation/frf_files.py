@@ -250,7 +250,8 @@ def _to_si(frf: MeasuredFrf) -> MeasuredFrf:
     try:
         factor = frf_factor(unit, frf.source.quantity, *directions)
     except QuantityError as error:
-        raise QuantityError(f"{frf.source.path}: {error}") from None
+        key = "the 'unit' of its [[frf]]: " if frf.source.unit else ""
+        raise QuantityError(f"{frf.source.path}: {key}{error}") from None
     variance = None if frf.variance is None else frf.variance * factor**2
     return replace(frf, values=frf.values * factor, variance=variance)
 

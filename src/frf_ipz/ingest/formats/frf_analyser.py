@@ -14,7 +14,8 @@ from frf_ipz.ingest.units import frf_factor
 from frf_ipz.quantities import FrfQuantity
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
 
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
@@ -28,6 +29,8 @@ ROLES = (  # of a column, by its name; the first that fits
     ("magnitude_db", re.compile(r"(mag|amp|abs|mod).*db|^db", re.IGNORECASE)),
     ("magnitude", re.compile(r"mag|amp|abs|modul", re.IGNORECASE)),
 )
+MAGNITUDES = {"magnitude", "magnitude_db"}
+PHASES = {"real", "imag", "phase_deg", "phase_rad"}
 LABELS = ("output_dof", "input_dof")
 RATIO = re.compile(r"\(([^()]+)\)\s*\(([^()]+)\)")  # SignalCalc writes (m/s²)(N) for a ratio
 MOST_HEAD = 1 << 12  # bytes in which a binary file shows itself
@@ -58,11 +61,12 @@ class _AnalyserText:
     def holds(self, source: FrfSource, head: bytes) -> bool:
         if source.columns or b"\0" in head[:MOST_HEAD] or source.skip_rows:
             return False
-        return find_frf_columns(source) is not None
+        return find_frf_columns(source) is not None or _holds_magnitudes_only(source.path)
 
     def read(self, source: FrfSource) -> tuple[MeasuredFrf, ...]:
         found = find_frf_columns(source)
         if found is None:
+            require_phase(source.path)
             raise FileFormatError(
                 source.path, "does not say what its columns are; write columns = [...] in its [[frf]]"
             )
@@ -75,7 +79,10 @@ class _AnalyserText:
     def look(self, source: FrfSource) -> FrfContents:
         found = find_frf_columns(source)
         if found is None:
-            raise FileFormatError(source.path, "does not say what its columns are")
+            require_phase(source.path)
+            raise FileFormatError(
+                source.path, "does not say what its columns are; write columns = [...] in its [[frf]]"
+            )
         about = f"columns {', '.join(found.columns)}"
         return FrfContents(n_outputs=1, n_inputs=1, quantity=found.quantity, unit=found.unit, about=about)
 
@@ -102,11 +109,7 @@ def find_frf_columns(source: FrfSource) -> AnalyserColumns | None:
         return None
     if any(label in fields for fields in layout.header for label in LABELS):  # a long table of many FRFs
         return None
-    for fields in layout.header:
-        words = [field for field in fields if field and not is_number(field)]
-        roles = [_role(word) or frf_text.SKIP for word in words]
-        if len(words) != layout.n_columns:  # units stand between the names
-            roles = list(dict.fromkeys(role for role in roles if role != frf_text.SKIP))
+    for words, roles in _possible_headers(layout):
         known = set(roles)
         is_complete = {"real", "imag"} <= known or (
             bool(known & {"magnitude", "magnitude_db"}) and bool(known & {"phase_deg", "phase_rad"})
@@ -122,6 +125,43 @@ def find_frf_columns(source: FrfSource) -> AnalyserColumns | None:
             frequency = frf_text.name_of_frequency(frf_text.stated_frequency_unit(layout, 0))
             return AnalyserColumns(columns=(frequency, *roles[1:]), unit=unit, quantity=quantity)
     return None
+
+
+def _possible_headers(layout: TextLayout) -> Iterator[tuple[list[str], list[str]]]:
+    """Give the words of each line of text, and what columns of such names are."""
+    for fields in layout.header:
+        words = [field for field in fields if field and not is_number(field)]
+        roles = [_role(word) or frf_text.SKIP for word in words]
+        if len(words) != layout.n_columns:  # units stand between the names
+            roles = list(dict.fromkeys(role for role in roles if role != frf_text.SKIP))
+        yield words, roles
+
+
+def require_phase(path: Path) -> None:
+    """Refuse text whose header names frequencies and magnitudes only.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Raises
+    ------
+    FileFormatError
+        If there is no phase.
+    """
+    if _holds_magnitudes_only(path):
+        problem = "its header names frequencies and magnitudes, without a phase, and poles and zeros need both"
+        raise FileFormatError(path, f"{problem}; export real and imaginary part, or magnitude and phase")
+
+
+def _holds_magnitudes_only(path: Path) -> bool:
+    try:
+        layout = sniff(path)
+    except FileFormatError:
+        return False
+    headers = [roles for _, roles in _possible_headers(layout) if len(roles) == layout.n_columns]
+    return any(roles[0] == frf_text.STATED and MAGNITUDES & set(roles) and not PHASES & set(roles) for roles in headers)
 
 
 def _role(word: str) -> str:

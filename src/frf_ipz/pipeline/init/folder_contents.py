@@ -8,6 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.ingest.formats.frf_analyser import require_phase
 from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.formats.modes_uff import holds_shapes
 from frf_ipz.ingest.formats.registry import is_known_recording, look_at_frfs, look_at_recording
@@ -151,6 +152,8 @@ def _kind(path: Path) -> str:
         return ""
     if _holds_frfs(path) or (not is_known and is_bare_frf(path)):
         return "frf"
+    if not is_known:
+        require_phase(path)
     if not is_known and path.suffix.lower() != CSV and not _is_table(path):
         return ""
     contents = look_at_recording(path)
