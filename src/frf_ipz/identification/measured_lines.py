@@ -192,6 +192,12 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
     independent = np.arange(frfs.n_lines) % frfs.correlated_lines == 0
     used = usable & independent & frfs.in_band(band, options.exclude_hz)
     if used.sum() < FEWEST_LINES:
+        if options.band_hz is None and usable.sum() >= FEWEST_LINES:
+            raise InputError(
+                f"only {int(used.sum())} of {int(usable.sum())} frequency lines carry a signal above the noise, from "
+                f"{band[0]:g} to {band[1]:g} Hz; a fit needs {FEWEST_LINES}: check the measurement and its channels, "
+                "or set [fit] band_hz to where there is a signal"
+            )
         raise InputError(
             f"only {int(used.sum())} usable frequency lines remain in the band {band[0]:g} to {band[1]:g} Hz; "
             f"a fit needs {FEWEST_LINES}: set a wider [fit] band_hz or a finer frequency resolution"

@@ -414,6 +414,14 @@ def test_noise_alone_has_no_modes():
         fit_modes(frfs, options=FitOptions(band_hz=(10.0, 900.0)))
 
 
+def test_noise_that_exceeds_its_level_on_a_line_is_told_from_lines_too_few():
+    values = np.zeros((len(LINES_HZ), 4), complex)
+    values[300] = 1.0
+    frfs = with_noise(LINES_HZ, values, labels_of(4, 1), 1e-3, np.random.default_rng(SEED))
+    with pytest.raises(InputError, match=r"only 1 of \d+ frequency lines carry a signal above the noise"):
+        fit_modes(frfs, options=FitOptions())
+
+
 def test_too_few_lines():
     frfs = accelerances(random_modes(SPREAD, 0.005), LINES_HZ)
     with pytest.raises(InputError, match="usable frequency lines"):
