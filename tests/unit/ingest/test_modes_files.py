@@ -70,6 +70,16 @@ def test_universal_file(tmp_path, analysis):
     np.testing.assert_allclose(got.shapes, signs * modes.shapes, rtol=1e-5)
 
 
+def test_modes_at_the_ground_are_refused(tmp_path):
+    (tmp_path / "modes.csv").write_text("mode,dof,real,frequency_hz,damping_ratio\n1,1:z,1,9,0.1\n1,0:z,2,9,0.1\n")
+    (tmp_path / "modes.unv").write_text(
+        universal(stated_modes(1)).replace(f"\n{stated_modes(1).dofs[0].node:10d}\n", f"\n{0:10d}\n")
+    )
+    for name in ("modes.csv", "modes.unv"):
+        with pytest.raises(frf_ipz.InputError, match=rf"{name}.* has the DOF 0:\+z, and node 0 is the ground"):
+            read(tmp_path / name)
+
+
 def test_universal_file_with_touching_columns(tmp_path):
     text = universal(stated_modes(3))
     assert "-1" in text

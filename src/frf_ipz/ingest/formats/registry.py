@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from frf_ipz.dofs import AnyDof
     from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf
     from frf_ipz.ingest.formats.modes_file import ModesSource
     from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents
@@ -82,7 +83,7 @@ def read_frf_file(source: FrfSource) -> tuple[MeasuredFrf, ...]:
         if candidate.holds(source, head):
             frfs: tuple[MeasuredFrf, ...] = candidate.read(source)
             for frf in frfs:
-                _require_motion(frf)
+                _require_motion(source.path, (frf.output_dof, frf.input_dof))
                 _require_sizes(frf)
             return frfs
     raise FileFormatError(
@@ -203,6 +204,7 @@ def read_modes_file(source: ModesSource) -> ModalParameters:
     for candidate in _formats(ModesFormat):
         if candidate.holds_modes(source.path, head):
             modes: ModalParameters = candidate.read_modes(source)
+            _require_motion(source.path, modes.dofs)
             return modes
     raise FileFormatError(
         source.path,
@@ -211,12 +213,12 @@ def read_modes_file(source: ModesSource) -> ModalParameters:
     )
 
 
-def _require_motion(frf: MeasuredFrf) -> None:
-    """Refuse FRFs of the ground."""
-    for dof in (frf.output_dof, frf.input_dof):
+def _require_motion(path: Path, dofs: Sequence[AnyDof]) -> None:
+    """Refuse what was measured at the ground."""
+    for dof in dofs:
         if isinstance(dof, Dof) and dof.node == GROUND:
-            problem = f"holds the FRF {frf.output_dof} / {frf.input_dof}, and node {GROUND} is the ground"
-            raise FileFormatError(frf.source.path, f"{problem}; name the nodes of the sensor and of the force")
+            problem = f"has the DOF {dof}, and node {GROUND} is the ground"
+            raise FileFormatError(path, f"{problem}; name the node of the sensor or of the force")
 
 
 def _require_sizes(frf: MeasuredFrf) -> None:
