@@ -10,9 +10,10 @@ from frf_ipz.identification.fit import fit_modes
 from frf_ipz.identification.likelihood.refinement import refine_poles
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.identification.root_covariance import pair_blocks
+from frf_ipz.identification.search import selection, split_half
 from frf_ipz.identification.search.find_modes import find_modes
 from frf_ipz.identification.search.goodness_of_fit import assess_fit
-from frf_ipz.identification.search.split_half import SplitHalf, without_unconfirmed
+from frf_ipz.identification.search.split_half import SplitHalf, fit_halves, without_unconfirmed
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
@@ -160,6 +161,42 @@ def test_what_was_found_of_a_pole_stays_with_it_where_others_are_discarded():
     frfs = windowed(random_modes(SEVEN, 0.015, seed=SEED), 2, 0.08)
     fitted = find_modes(frfs.select_lines(np.arange(frfs.n_lines) % 2 == 0), FitOptions())
     assert len(fitted.goodness.significance) == len(fitted.goodness.drops) == len(fitted.fit.poles)
+
+
+def count_fits(monkeypatch):
+    """Keep the poles from which the choice of modes refines."""
+    starts = []
+
+    def refine(data, poles, terms, **options):
+        starts.append(poles.tobytes())
+        return refine_poles(data, poles, terms, **options)
+
+    monkeypatch.setattr(selection, "refine_poles", refine)
+    return starts
+
+
+def test_no_choice_of_modes_is_tried_twice(monkeypatch):
+    starts = count_fits(monkeypatch)
+    fitted = find_modes(windowed(random_modes(SEVEN, 0.015, seed=SEED), 0, 0.04), FitOptions(delay=False))
+    assert np.median(fitted.misfit_ratio) > 10  # what no round of poles takes away
+    assert len(starts) == len(set(starts))
+
+
+def test_halves_weigh_the_error_of_the_model_from_the_first_on(monkeypatch):
+    frfs, options = windowed(random_modes(SEVEN, 0.015, seed=SEED), 4, 0.1), FitOptions(delay=False)
+    starts = count_fits(monkeypatch)
+    fitted = find_modes(frfs, options)
+    n_fits = len(starts)
+    again = find_modes(frfs, options, model_error=fitted.model_error)
+    assert len(starts) - n_fits < 0.7 * n_fits
+    width = -fitted.fit.poles.real
+    assert len(again.fit.poles) == len(fitted.fit.poles)
+    assert np.all(np.min(np.abs(again.fit.poles - fitted.fit.poles[:, None]), axis=1) < 0.1 * width)
+    given = []
+    monkeypatch.setattr(split_half, "find_modes", lambda *_, model_error: given.append(model_error) or fitted)
+    fit_halves(frfs, fitted, options)
+    assert given[0] is given[1] is fitted.model_error
+    assert find_modes(four_modes(), options).model_error is None
 
 
 @pytest.mark.slow

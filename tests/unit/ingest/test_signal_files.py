@@ -3,12 +3,11 @@
 import gc
 import io
 import struct
+import sys
 import wave
 import zipfile
 
 import lvm_read
-import sys
-
 import numpy as np
 import openpyxl
 import pytest

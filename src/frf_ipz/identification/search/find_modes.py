@@ -47,7 +47,7 @@ from frf_ipz.identification.search.selection import (
     select_modes,
 )
 from frf_ipz.identification.search.spurious_poles import half_widths_apart
-from frf_ipz.identification.stabilization import find_start_poles
+from frf_ipz.identification.stabilization import StartPoles, find_start_poles
 from frf_ipz.late_imports import import_late
 from frf_ipz.progress import Progress, silent
 
@@ -104,6 +104,8 @@ class FittedModes:
         Each channel has a delay of its own, though the user did not ask for that.
     poles_are_held : bool
         Poles are given and were not fitted.
+    model_error : (n_frfs,) array or None
+        Mean square of the error of the model in parts of each FRF's, where it and not the noise limits the fit.
     """
 
     lines: MeasuredLines
@@ -121,9 +123,12 @@ class FittedModes:
     common_delay: CommonDelay | None = None
     has_delayed_channels: bool = False
     poles_are_held: bool = False
+    model_error: FloatArray | None = None
 
 
-def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent) -> FittedModes:
+def find_modes(
+    frfs: FrfSet, options: FitOptions, *, model_error: FloatArray | None = None, progress: Progress = silent
+) -> FittedModes:
     """Find the modes that the lines support.
 
     Parameters
@@ -132,6 +137,8 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
         Measured FRFs; with their variance where it is known.
     options : FitOptions
         Band, pinned and rejected poles, kind of modes.
+    model_error : (n_frfs,) array, optional
+        Error of the model where it is known to limit the fit, as `FittedModes` has it.
     progress : Progress
         Reports how far the search is.
 
@@ -149,6 +156,8 @@ def find_modes(frfs: FrfSet, options: FitOptions, *, progress: Progress = silent
     """
     progress(0.0, "choosing lines")
     lines = measured_lines(frfs, options)
+    if model_error is not None:
+        return _find_by_model_error(frfs, lines, options, model_error)
     late = _fit_late_responses(frfs, lines, options, progress) if options.delay is None else None
     if late is not None and np.median(late.misfit_ratio) < MODEL_ERROR:
         return late
@@ -241,26 +250,13 @@ def _fit_advanced(frfs: FrfSet, delay: CommonDelay, options: FitOptions) -> Fitt
 
 def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progress: Progress) -> FittedModes:
     progress(0.05, "looking for first poles")
-    start = find_start_poles(frfs, lines, max_order=options.max_order, stability=options.stability)
-    all_terms = smooth_terms_of_band(lines.band_hz, lines.line_hz)
+    start, all_terms, lines = _prepared(frfs, lines, options)
     terms = all_terms.first(FIXED_POLES)
-    lines = _with_noise_beside_peaks(lines, start.poles, terms)
-    lines = with_discrepancy(frfs, lines, start.poles, terms, options)
     progress(0.2, "adding and dropping poles")
     noise_is_known = bool(lines.known.all())
 
     def fit_lines(lines: MeasuredLines, delay_s: FloatArray) -> FittedModes:
-        selected = _select(lines, start.poles, terms, options, noise_is_known=noise_is_known)
-        chosen = _needed_terms(selected.data, selected.fit.poles, all_terms)
-        if chosen.n_columns > terms.n_columns:  # some poles may have stood for them
-            other = _select(lines, selected.fit.poles, chosen, options, noise_is_known=noise_is_known)
-            n_shared, n_shared_before = (
-                np.count_nonzero(np.triu(half_widths_apart(one.fit.poles) < 1, 1)) for one in (other, selected)
-            )
-            if n_shared > n_shared_before:  # a drift, no lack of fixed poles
-                chosen = terms
-            else:
-                selected = other
+        selected, chosen = _select_with_terms(lines, start.poles, all_terms, options, noise_is_known=noise_is_known)
         progress(0.5, "refining")
         return _refine_with_final_weights(lines, selected, chosen, options, start=start.table, delay_s=delay_s)
 
@@ -284,6 +280,55 @@ def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progres
         with suppress(NoModesError):  # where the model error hides them all, those of the noise alone are what there is
             fitted = _against_model_error(fitted, options)
     return fitted
+
+
+def _prepared(frfs: FrfSet, lines: MeasuredLines, options: FitOptions) -> tuple[StartPoles, SmoothTerms, MeasuredLines]:
+    """Find first poles and the terms that there may be, and give the lines the variance that no model is needed for."""
+    start = find_start_poles(frfs, lines, max_order=options.max_order, stability=options.stability)
+    all_terms = smooth_terms_of_band(lines.band_hz, lines.line_hz)
+    terms = all_terms.first(FIXED_POLES)
+    lines = _with_noise_beside_peaks(lines, start.poles, terms)
+    return start, all_terms, with_discrepancy(frfs, lines, start.poles, terms, options)
+
+
+def _select_with_terms(
+    lines: MeasuredLines, poles: ComplexArray, all_terms: SmoothTerms, options: FitOptions, *, noise_is_known: bool
+) -> tuple[SelectedModes, SmoothTerms]:
+    """Choose the modes, and anew where the lines ask for more fixed poles: some modes may have stood for them."""
+    few = all_terms.first(FIXED_POLES)
+    selected = _select(lines, poles, few, options, noise_is_known=noise_is_known)
+    more = _needed_terms(selected.data, selected.fit.poles, all_terms)
+    if more.n_columns == few.n_columns:
+        return selected, few
+    other = _select(lines, selected.fit.poles, more, options, noise_is_known=noise_is_known)
+    n_shared, n_shared_before = (
+        np.count_nonzero(np.triu(half_widths_apart(one.fit.poles) < 1, 1)) for one in (other, selected)
+    )
+    return (selected, few) if n_shared > n_shared_before else (other, more)  # more shared: a drift, no lack of poles
+
+
+def _find_by_model_error(
+    frfs: FrfSet, lines: MeasuredLines, options: FitOptions, model_error: FloatArray
+) -> FittedModes:
+    """Find the modes where the error of the model is known: weighed by the noise alone, they would be chosen twice."""
+    start, all_terms, lines = _prepared(frfs, lines, options)
+    noise = lines.variance
+    weighed = _with_model_error(lines, model_error)
+    selected, terms = _select_with_terms(weighed, start.poles, all_terms, options, noise_is_known=False)
+    fitted = _refine_with_final_weights(
+        replace(weighed, known=np.ones_like(weighed.known)),
+        selected,
+        terms,
+        options,
+        start=start.table,
+        delay_s=np.zeros(frfs.n_frfs),
+        model_limits=True,
+    )
+    return replace(fitted, noise=noise, model_error=model_error)
+
+
+def _with_model_error(lines: MeasuredLines, model_error: FloatArray) -> MeasuredLines:
+    return replace(lines, variance=lines.variance + model_error * np.abs(lines.receptance) ** 2)
 
 
 def _needed_terms(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) -> SmoothTerms:
@@ -346,7 +391,7 @@ def _against_model_error(fitted: FittedModes, options: FitOptions) -> FittedMode
     power = np.abs(fitted.lines.receptance) ** 2
     relative = np.maximum(squares - fitted.noise, 0.0) / np.maximum(power, np.finfo(float).tiny)
     error = np.median(relative, axis=0) / log(2)  # an exponential distribution has ln 2 times its mean at the median
-    lines = replace(fitted.lines, variance=fitted.noise + error * power)
+    lines = _with_model_error(replace(fitted.lines, variance=fitted.noise), error)
     selected = _select(lines, fitted.fit.poles, fitted.terms, options, noise_is_known=False)
     lines = replace(lines, known=np.ones_like(lines.known))  # the model error is part of it: not to be estimated again
     refitted = _refine_with_final_weights(
@@ -360,6 +405,7 @@ def _against_model_error(fitted: FittedModes, options: FitOptions) -> FittedMode
         lines=replace(refitted.lines, known=fitted.lines.known),
         misfit_ratio=np.sqrt(np.sum(squares / fitted.noise, axis=0) / degrees_of_freedom),
         noise=fitted.noise,
+        model_error=error,
         drift=refitted.drift or fitted.drift,
         force_error=refitted.force_error or fitted.force_error,
         decisions=(

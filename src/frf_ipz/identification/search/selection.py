@@ -168,10 +168,11 @@ def _search(data: WeightedLines, terms: SmoothTerms, options: FitOptions, *, noi
 def _add_and_drop(search: _Search, start: RefinedPoles) -> tuple[RefinedPoles, GoodnessOfFit]:
     search.noise_is_trusted = search.noise_is_known
     fit, goodness = _drop_insignificant(search, start, spurious_too=False)
+    in_vain = np.zeros(0, complex)  # proposed beside the same fit before
     for _ in range(ROUNDS):
         fit, goodness = _without_drift(search, fit, goodness)
         proposed = _proposed_poles(search, goodness)
-        if not len(proposed):
+        if not len(proposed) or np.array_equal(proposed, in_vain):
             break
         trial = refine_poles(
             search.data, np.concatenate([fit.poles, proposed]), search.terms, iterations=ROUGH_ITERATIONS
@@ -179,7 +180,9 @@ def _add_and_drop(search: _Search, start: RefinedPoles) -> tuple[RefinedPoles, G
         search.refused.extend(trial.discarded.tolist())
         trial, trial_goodness = _drop_insignificant(search, trial)
         if len(trial.poles) <= len(fit.poles) and trial.misfit > fit.misfit:
+            in_vain = proposed
             continue
+        in_vain = in_vain[:0]
         if trial.misfit < CLEARED * fit.misfit:
             search.refused.clear()  # they were compared with a misfit that was not noise
         search.record(*_added_poles(fit.poles, trial.poles))

@@ -183,7 +183,10 @@ def fit_halves(frfs: FrfSet, fitted: FittedModes, options: FitOptions) -> SplitH
     advanced = replace(frfs, values=frfs.values * np.exp(frfs.s[:, None] * fitted.delay_s))
     options = replace(options, band_hz=fitted.lines.band_hz, delay=False)
     numbers = np.arange(frfs.n_lines)
-    halves = [_fit_half(advanced.select_lines(numbers % HALVES == number), options) for number in range(HALVES)]
+    halves = [
+        _fit_half(advanced.select_lines(numbers % HALVES == number), options, fitted.model_error)
+        for number in range(HALVES)
+    ]
     poles = fitted.fit.poles
     partners = np.stack([_partners(poles, half.poles) for half in halves])
     in_both = (partners >= 0).all(axis=0)
@@ -211,9 +214,9 @@ def fit_halves(frfs: FrfSet, fitted: FittedModes, options: FitOptions) -> SplitH
     )
 
 
-def _fit_half(frfs: FrfSet, options: FitOptions) -> _Half:
+def _fit_half(frfs: FrfSet, options: FitOptions, model_error: FloatArray | None) -> _Half:
     try:
-        fitted = find_modes(frfs, options)
+        fitted = find_modes(frfs, options, model_error=model_error)
     except NoModesError:  # no mode stands out of the noise
         return _Half(poles=np.zeros(0, complex), variance=np.zeros((2, 0)))
     variance = variance_factors(fitted) * _white_noise_variance(fitted)

@@ -71,7 +71,10 @@ def read(data: IO[bytes], path: Path) -> FileContents:
     arrays: dict[str, Any] = {}
     signals: list[tuple[str, str]] = []
     unread: dict[str, str] = {}
-    with errors_of_reader(path, KIND, losses=LOSSES) as said, asammdf.MDF(_BytesThatEnd(path, content_bytes)) as content:
+    with (
+        errors_of_reader(path, KIND, losses=LOSSES) as said,
+        asammdf.MDF(_BytesThatEnd(path, content_bytes)) as content,
+    ):
         linear = LINEAR.get(content.version[0], set())
         sizes = [group.channel_group.cycles_nr * 8 * len(group.channels) for group in content.groups]
         require_expanded(path, sum(sizes), file_bytes=len(content_bytes), most_bytes=MOST_EXPANDED)
