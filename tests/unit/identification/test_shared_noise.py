@@ -139,7 +139,9 @@ def test_noise_that_is_kept_for_the_whole_record_is_white():
     relative = np.nan_to_num(np.sqrt(frfs.variance) / np.abs(frfs.values)) + 0j
     whole = ForceNoise(relative=relative, force=np.zeros(1, int), interval_s=(0.0, N_SAMPLES / RATE_HZ))
     fitted = find_modes(frfs, FitOptions())
-    lines = replace(fitted.lines, force_noise=measured_lines(replace(frfs, force_noise=whole), FitOptions()).force_noise)
+    lines = replace(
+        fitted.lines, force_noise=measured_lines(replace(frfs, force_noise=whole), FitOptions()).force_noise
+    )
     factors = shared_noise_factors(lines, fitted.fit, fitted.terms, windowed_s=N_SAMPLES / RATE_HZ)
     np.testing.assert_allclose(factors, 1.0, rtol=0.35, atol=0)  # a peak is four lines wide: they are not many
 

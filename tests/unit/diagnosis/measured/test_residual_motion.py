@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from frf_ipz.diagnosis.measured.forces import RINGING
+from frf_ipz.diagnosis.measured.forces import RINGING, isolate_pulse
 from frf_ipz.diagnosis.measured.from_records import estimate_transfer_functions, survey_records
 from frf_ipz.diagnosis.measured.group_spectra import group_records
 from frf_ipz.diagnosis.measured.preprocessing.dc_offset import remove_dc_offset
@@ -236,10 +236,46 @@ def test_residual_motion_of_a_record_whose_lead_was_cut_is_the_later_part(succes
     np.testing.assert_allclose(begin + np.exp(-s * cut * record.step_s)[:, None] * part, whole, rtol=1e-9, atol=0)
 
 
+def first_group(observations):
+    pulses = {record.name: isolate_pulse(record) for record in observations.records}
+    decay = WINDOW_DECAYS / observations.records[0].duration_s
+    return _prepare_group(group_records(observations)[0], pulses, observations, decay)
+
+
+def without_its_second_sensor(record):
+    return replace(record, sensors=record.sensors[:1], responses=record.responses[:1])
+
+
+def test_an_impact_that_lacks_a_sensor_left_its_motion_all_the_same(successive_impacts):
+    """An overloaded channel is left out of the impact that it overloaded in: its force is known, and its noise is not.
+
+    What no FRF explains is nothing at all where there is one impact, and not its noise.
+    """
+    noisy, alone = successive_impacts(600, lambda number: number + 1, noise_part=3e-4)
+    first, *others = noisy.records
+    lacking = replace(noisy, records=(without_its_second_sensor(first), *others))
+    for removing in (noisy, lacking):
+        restored = [record.responses for record in remove_residual_motion(removing).records[1:]]
+        residual = np.array([record.responses for record in others]) - alone[1:]
+        assert np.linalg.norm(np.array(restored) - alone[1:]) < 0.05 * np.linalg.norm(residual)
+
+
+def test_a_single_impact_knows_its_offset_by_what_moves_before_it(strike):
+    record, rng = strike().records[0], np.random.default_rng(8)
+    noise = 1e-3 * largest(strike())
+    stds = []
+    for _ in range(20):
+        responses = record.responses + noise * rng.standard_normal(record.responses.shape)
+        single = replace(strike(), records=(replace(record, responses=responses),))
+        restored = remove_residual_motion(single)
+        stds.append(subtracted(single, restored)[0, :, 0] / restored.records[0].dc_offset_std)
+    assert 0.6 < np.sqrt(np.mean(np.square(stds))) < 1.4
+
+
 def test_the_initial_state_of_each_mode_follows_from_all_forces_before(successive_impacts):
     observations, _ = successive_impacts(600, lambda number: number + 1)
     ordered = observations.records
-    group = _prepare_group(group_records(observations)[0], observations, WINDOW_DECAYS / ordered[0].duration_s)
+    group = first_group(observations)
     step, force = ordered[0].step_s, np.concatenate([record.force for record in ordered])
     assert group.initial_state(ordered[0]) is None
     for number, record in enumerate(ordered[1:], start=1):
@@ -249,8 +285,7 @@ def test_the_initial_state_of_each_mode_follows_from_all_forces_before(successiv
         np.testing.assert_allclose(residual, whole, rtol=1e-2)  # forces are cut where nothing touches
         assert np.all(error > 0.009 * np.abs(residual))
     without_one = replace(observations, records=(ordered[0], *ordered[2:]))
-    group = _prepare_group(group_records(without_one)[0], without_one, WINDOW_DECAYS / ordered[0].duration_s)
-    assert group.initial_state(ordered[2]) is None
+    assert first_group(without_one).initial_state(ordered[2]) is None
 
 
 @pytest.mark.slow

@@ -67,6 +67,7 @@ class _Group:
 
     records: tuple[ObservedRecord, ...]
     pulses: tuple[Pulse, ...]  # of the same; of a shaker, from where it starts
+    before: tuple[Pulse, ...]  # of all records at the excited point, those that lack a sensor too
     lines: GroupSpectra
     poles: ComplexArray
     pole_stds: FloatArray  # rad/s
@@ -120,15 +121,15 @@ class _Group:
         if not record.has_predecessor:
             return None
         earlier = [
-            (previous, pulse.record.force)
-            for previous, pulse in zip(self.records, self.pulses, strict=True)
-            if previous.recording == record.recording and previous.number < record.number
+            pulse.record
+            for pulse in self.before
+            if pulse.record.recording == record.recording and pulse.record.number < record.number
         ]
         if len(earlier) != record.number - 1:
             return None
         state, state_by_pole = np.zeros((2, len(self.poles)), complex)
-        for previous, force in earlier:
-            touched = np.flatnonzero(force)
+        for previous in earlier:
+            force, touched = previous.force, np.flatnonzero(previous.force)
             later = record.start_s - previous.start_s - record.step_s * touched
             decaying = record.step_s * np.exp(np.outer(self.poles, later))
             state += decaying @ force[touched]
@@ -170,7 +171,9 @@ def remove_residual_motion(observations: Observations) -> Observations:
     if observations.kind != "hammer" and min(len(records) for records in record_groups) < MIN_RECORDS:
         return observations
     decay = WINDOW_DECAYS / min(record.duration_s for record in observations.records)
-    groups = [_prepare_group(records, observations, decay) for records in record_groups]
+    gate = isolate_pulse if observations.kind == "hammer" else _gate_from_start
+    pulses = {record.name: gate(record) for record in observations.records}
+    groups = [_prepare_group(records, pulses, observations, decay) for records in record_groups]
     residual: dict[tuple[str, str], _Estimate] = {}
     for channel in dict.fromkeys(sensor.channel for group in groups for sensor in group.records[0].sensors):
         rows = [
@@ -183,31 +186,39 @@ def remove_residual_motion(observations: Observations) -> Observations:
     return replace(observations, records=tuple(_subtract(record, residual) for record in observations.records))
 
 
-def _prepare_group(records: tuple[ObservedRecord, ...], observations: Observations, decay: float) -> _Group:
-    is_hammer = observations.kind == "hammer"
-    pulses = tuple(isolate_pulse(record) if is_hammer else _gate_from_start(record) for record in records)
+def _prepare_group(
+    records: tuple[ObservedRecord, ...], all_pulses: dict[str, Pulse], observations: Observations, decay: float
+) -> _Group:
+    pulses = tuple(all_pulses[record.name] for record in records)
+    before = tuple(all_pulses[record.name] for record in observations.records_at(records[0].input_dof))
     transformed = tuple(pulse.record for pulse in pulses)
     lines = transform_group(transformed, observations.band_hz, decay)
     poles: list[LocalPole] = []
     residues = np.zeros((0, len(records[0].sensors)))
     if any(record.has_predecessor for record in records):
-        from_rest = tuple(record for record in transformed if not record.has_predecessor)
+        at_rest = tuple(pulse.record for pulse in before if not pulse.record.has_predecessor)
+        own = tuple(record for record in transformed if not record.has_predecessor)
+        from_rest = own or tuple(record for record in at_rest if record.sensors == at_rest[0].sensors)
         lines_from_rest = transform_group(from_rest, observations.band_hz, decay) if from_rest else lines
         duration_s = min(record.duration_s for record in from_rest or transformed)
         poles = _find_poles(lines_from_rest, decay, duration_s)
-        peaks = [int(np.argmin(np.abs(lines_from_rest.s - pole.pole))) for pole in poles]
+        of_all_sensors = lines_from_rest if own else lines
+        peaks = [int(np.argmin(np.abs(of_all_sensors.s - pole.pole))) for pole in poles]
         distance = np.array(
-            [np.abs(lines_from_rest.s[line] - pole.pole) for line, pole in zip(peaks, poles, strict=True)]
+            [np.abs(of_all_sensors.s[line] - pole.pole) for line, pole in zip(peaks, poles, strict=True)]
         )
-        residues = np.abs(lines_from_rest.values[peaks]) * distance[:, None]
+        residues = np.abs(of_all_sensors.values[peaks]) * distance[:, None]
     return _Group(
         records=records,
         pulses=pulses,
+        before=before,
         lines=lines,
         poles=np.array([pole.pole for pole in poles], complex),
         pole_stds=np.array([pole.std_rad_s for pole in poles]),
         residues=residues,
-        missing_samples=np.array([missing_ringing(pulse, pulse.record.responses)[1:] * is_hammer for pulse in pulses])
+        missing_samples=np.array(
+            [missing_ringing(pulse, pulse.record.responses)[1:] * (observations.kind == "hammer") for pulse in pulses]
+        )
         * np.sqrt(MISSING_SAMPLES),
     )
 
@@ -270,9 +281,13 @@ def _estimate_channel(rows: list[tuple[_Group, int]]) -> dict[str, _Estimate]:
     priors = [_prior_root(group, row) for group, row in rows]
     root, offsets = np.zeros((0, 0)), np.zeros(0, np.int64)
     for _ in range(ROUNDS):
+        misfits = [
+            _misfit(group, row, of_group, least_noise) for (group, row), of_group in zip(rows, amplitudes, strict=True)
+        ]
+        shown = [misfit for misfit in misfits if misfit is not None]
         equations = [
-            _normal_equations(group, row, of_group, least_noise)
-            for (group, row), of_group in zip(rows, amplitudes, strict=True)
+            _normal_equations(group, row, misfit, shown, least_noise)
+            for (group, row), misfit in zip(rows, misfits, strict=True)
         ]
         before = np.cumsum([0, *(len(normal.slope) for normal in equations)])
         offsets = np.concatenate([start + normal.offset_rows for start, normal in zip(before, equations, strict=False)])
@@ -318,40 +333,91 @@ def _few_columns(root: FloatArray) -> FloatArray:
     return np.asarray(directions[:, large] * sizes[large])
 
 
-def _normal_equations(group: _Group, row: int, amplitudes: list[FloatArray], least_noise: float) -> _NormalEquations:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Misfit:
+    """What no FRF explains in one channel of a group, and the noise that it shows.
+
+    Parameters
+    ----------
+    variance : (n_lines / FINER, n_records) array
+        Of the lines, by noise and by errors of the model.
+    std : float
+        Of a sample.
+    noise : Noise
+        Of the channel.
+    n_records : int
+        That show it.
+    """
+
+    variance: FloatArray
+    std: float
+    noise: Noise
+    n_records: int
+
+
+def _misfit(group: _Group, row: int, amplitudes: list[FloatArray], least_noise: float) -> _Misfit | None:
+    """Measure the misfit; None of a single record, which some FRF explains whatever is in it."""
+    if len(group.records) < 2:
+        return None
     units = [group.unit_spectra(record) for record in group.records]
     response, force = group.lines.responses[::FINER, :, row], group.lines.force[::FINER]
     rest = response - np.stack([unit @ size for unit, size in zip(units, amplitudes, strict=True)], 1)
     per_square = 2 * group.lines.s.real[0] / group.records[0].step_s
     energy = _unexplained_energy(force, rest) + least_noise**2 / per_square
-    noise = float(np.sqrt(np.median(energy) * per_square))
-    alike = lines_of_one_number(group.lines.s[::FINER], group.duration_s)
-    weight = 1 / (alike * (energy[:, None] + (MODEL_ERROR * np.abs(rest)) ** 2))
+    of_model = (MODEL_ERROR * np.abs(rest)) ** 2
+    gain = np.full(len(energy), 0.5 / group.lines.s.real[0])
+    return _Misfit(
+        variance=energy[:, None] + of_model,
+        std=float(np.sqrt(np.median(energy) * per_square)),
+        noise=fit_noise(group.lines.frequency_hz[::FINER], energy, gain, np.mean(of_model, axis=1)),
+        n_records=len(group.records),
+    )
+
+
+def _normal_equations(
+    group: _Group, row: int, misfit: _Misfit | None, shown: list[_Misfit], least_noise: float
+) -> _NormalEquations:
+    """Gather what lines and the samples before impacts tell; of a single record, no line tells anything."""
+    before = [record.responses[row, : pulse.start] for record, pulse in zip(group.records, group.pulses, strict=True)]
+    units = [group.unit_spectra(record) for record in group.records]
+    n = sum(unit.shape[1] for unit in units)
+    if misfit is None:
+        of_lines = np.zeros((n, n)), np.zeros(n)
+        best = max(shown, key=lambda misfit: misfit.n_records, default=None)
+        std, noise = (best.std, best.noise) if best else _noise_before(before, group.records[0].step_s, least_noise)
+    else:
+        of_lines = _equations_of_lines(group, row, units, misfit.variance)
+        std, noise = misfit.std, misfit.noise
+    quiet = [
+        _equations_before(group, record, samples, noise) for record, samples in zip(group.records, before, strict=True)
+    ]
+    return _NormalEquations(
+        n_terms=tuple(unit.shape[1] for unit in units),
+        noise=std,
+        curvature=of_lines[0] + block_diag(*(curvature for curvature, _ in quiet)),
+        slope=of_lines[1] + np.concatenate([slope for _, slope in quiet]),
+    )
+
+
+def _noise_before(before: list[FloatArray], step_s: float, least_noise: float) -> tuple[float, Noise]:
+    """Take all that moves before the impacts for white noise, where no repeated impact shows it."""
+    std = max((float(np.std(samples)) for samples in before if len(samples)), default=0.0) or least_noise
+    return std, Noise(white=std**2 * step_s)
+
+
+def _equations_of_lines(
+    group: _Group, row: int, units: list[ComplexArray], variance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Curvature and slope by the lines, on each of which the FRF is free."""
+    response, force = group.lines.responses[::FINER, :, row], group.lines.force[::FINER]
+    weight = 1 / (lines_of_one_number(group.lines.s[::FINER], group.duration_s) * variance)
     shared = weight * force / np.sqrt(np.sum(weight * np.abs(force) ** 2, 1))[:, None]
     across = np.hstack([column[:, None].conj() * unit for column, unit in zip(shared.T, units, strict=True)])
     along = np.sum(shared.conj() * response, 1)
     weighted = [(unit.conj() * part[:, None]).T for unit, part in zip(units, weight.T, strict=True)]
-    before = [record.responses[row, : pulse.start] for record, pulse in zip(group.records, group.pulses, strict=True)]
-    density = fit_noise(
-        group.lines.frequency_hz[::FINER],
-        energy,
-        np.full(len(energy), 0.5 / group.lines.s.real[0]),
-        np.mean((MODEL_ERROR * np.abs(rest)) ** 2, axis=1),
-    )
-    quiet = [
-        _equations_before(group, record, samples, density)
-        for record, samples in zip(group.records, before, strict=True)
-    ]
-    curvatures = [(part @ unit).real + added for part, unit, (added, _) in zip(weighted, units, quiet, strict=True)]
-    slopes = [
-        (part @ values).real + added for part, values, (_, added) in zip(weighted, response.T, quiet, strict=True)
-    ]
-    return _NormalEquations(
-        n_terms=tuple(unit.shape[1] for unit in units),
-        noise=noise,
-        curvature=block_diag(*curvatures) - (across.conj().T @ across).real,
-        slope=np.concatenate(slopes) - (across.conj().T @ along).real,
-    )
+    curvature = block_diag(*((part @ unit).real for part, unit in zip(weighted, units, strict=True)))
+    slope = np.concatenate([(part @ values).real for part, values in zip(weighted, response.T, strict=True)])
+    return curvature - (across.conj().T @ across).real, slope - (across.conj().T @ along).real
 
 
 def _equations_before(
@@ -421,6 +487,6 @@ def _unexplained_energy(force: ComplexArray, response: ComplexArray) -> FloatArr
     """Energy, (n_lines,), that one FRF does not explain, averaged over neighbouring lines."""
     power = np.sum(np.abs(force) ** 2, 1)
     values = np.sum(response * force.conj(), 1) / power
-    energy = np.sum(np.abs(response - values[:, None] * force) ** 2, 1) / max(force.shape[1] - 1, 1)
+    energy = np.sum(np.abs(response - values[:, None] * force) ** 2, 1) / (force.shape[1] - 1)
     floor = np.finfo(float).tiny + 1e-12 * float(np.mean(np.abs(response) ** 2))
     return np.asarray(uniform_filter1d(energy, SMOOTHED_LINES, mode="nearest") + floor)
