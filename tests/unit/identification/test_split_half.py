@@ -152,6 +152,11 @@ def windowed(truth, seed, at_s):
     return replace(frfs, values=frfs.values + noisy.values - exact.values)
 
 
+WINDOWS = (
+    *((0, 0.04), (1, 0.055), (2, 0.08)),
+    *((20, 0.07), (20, 0.1), (20, 0.14)),
+    *((21, 0.05), (21, 0.07), (21, 0.1)),
+)
 SEVEN = np.array([55.0, 98.0, 140.0, 188.0, 231.0, 290.0, 341.0])
 
 
@@ -203,7 +208,7 @@ def test_halves_weigh_the_error_of_the_model_from_the_first_on(monkeypatch):
 def test_halves_agree_where_a_window_makes_model_error():
     normalised, counts = [], []
     truth = random_modes(SEVEN, 0.015, seed=SEED)
-    for seed, at_s in enumerate((0.04, 0.055, 0.08)):
+    for seed, at_s in WINDOWS:
         frfs = windowed(truth, seed, at_s)
         first, second = halves_of(frfs, FitOptions())
         normalised.append(differences(first, second))
