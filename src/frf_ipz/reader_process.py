@@ -28,6 +28,7 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.input_files import BLOCK_BYTES, open_input, require_expanded
+from frf_ipz.json_files import parse_json
 from frf_ipz.output_files import write_bytes
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ class _Reader:
             clock = _Clock(process, LONGEST_S + file_bytes / BYTES_PER_S)
             try:
                 _ask(process, module, path, stream, file_bytes)
-                answer = _line(process)
+                answer = _line(process, path)
                 sizes = (math.prod(shape) * np.dtype(form).itemsize for _, form, shape, _ in answer["arrays"])
                 require_expanded(path, sum(sizes), file_bytes=file_bytes, most_bytes=most_bytes)
                 arrays = {name: _array(process, form, shape, order) for name, form, shape, order in answer["arrays"]}
@@ -199,13 +200,12 @@ def _ask(process: subprocess.Popen[bytes], module: str, path: Path, stream: IO[b
     asked.flush()
 
 
-def _line(process: subprocess.Popen[bytes]) -> dict[str, Any]:
+def _line(process: subprocess.Popen[bytes], path: Path) -> dict[str, Any]:
     answers: Any = process.stdout
     line = answers.readline()
     if not line.endswith(b"\n"):
         raise EOFError
-    answer: dict[str, Any] = json.loads(line)
-    return NOTHING_SAID | answer
+    return NOTHING_SAID | parse_json(line, path)
 
 
 def _array(process: subprocess.Popen[bytes], form: str, shape: list[int], order: Literal["C", "F"]) -> NDArray[Any]:
@@ -227,7 +227,7 @@ def answer_all() -> None:
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a library prints is no answer
     for line in sys.stdin.buffer:
-        asked = json.loads(line)
+        asked = parse_json(line, Path("what is asked"))
         data = BytesIO(sys.stdin.buffer.read(asked["n_bytes"]))
         _answer(answers, asked["module"], data, Path(asked["name"]))
 
