@@ -138,8 +138,10 @@ class _Reader:
                 arrays = {name: _array(process, form, shape, order) for name, form, shape, order in answer["arrays"]}
             except (EOFError, BrokenPipeError):
                 self.end()
-                does = f"takes longer than {clock.longest_s:.0f} s" if clock.has_rung else "ends what reads it"
-                raise FileFormatError(path, f"cannot be read as {kind}: it {does}; is it damaged?") from None
+                late = f"keeps the library that reads it for more than {clock.longest_s:.0f} s"
+                does = late if clock.has_rung else "crashes the library that reads it"
+                problem = f"cannot be read as {kind}: it {does}; is it damaged? copy or export it again"
+                raise FileFormatError(path, problem) from None
             except BaseException:
                 self.end()  # in the middle of an answer
                 raise

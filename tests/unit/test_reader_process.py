@@ -101,7 +101,7 @@ def test_one_process_reads_one_file_after_another(ask):
 @pytest.mark.parametrize(
     ("word", "message"),
     [
-        ("abort", "file.DAT: cannot be read as a file of words: it ends what reads it; is it damaged"),
+        ("abort", "file.DAT: cannot be read as a file of words: it crashes the library that reads it; is it damaged"),
         ("refuse", "file.DAT, line 3: is not what it should be"),
         ("raise", "cannot be read as a file of words: what a library says"),
         ("object", "'a' is an array of object"),
@@ -115,7 +115,7 @@ def test_what_a_file_does_to_its_reader_is_one_error_and_the_next_is_read(ask, w
 
 
 def test_a_file_that_keeps_its_reader_is_one_error_and_the_next_is_read(ask, monkeypatch):
-    with monkeypatch.context() as patched, pytest.raises(FileFormatError, match="takes longer than 2 s"):
+    with monkeypatch.context() as patched, pytest.raises(FileFormatError, match="keeps the library that reads it for more than 2 s"):
         patched.setattr(reader_process, "LONGEST_S", 2.0)
         ask("sleep")
     assert ask("x").said["word"] == "x"
