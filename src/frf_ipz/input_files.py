@@ -218,6 +218,33 @@ def open_input(path: Path) -> Iterator[BufferedReader]:
             ledger.require_unchanged(path, stream)
 
 
+def require_size(path: Path, *, most_bytes: int | None = None) -> int:
+    """Refuse a file that is too large, before it is read.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    most_bytes : int, optional
+        A larger file is refused; by default one that is larger than the memory of the machine.
+
+    Returns
+    -------
+    int
+        Its size, bytes.
+
+    Raises
+    ------
+    FileFormatError
+        If it is missing, is no file, or is too large.
+    """
+    size = require_regular_file(path)
+    limit = _memory_bytes() if most_bytes is None else most_bytes
+    if size > limit:
+        raise _too_large(path, size, limit)
+    return size
+
+
 def read_bytes(path: Path, *, most_bytes: int | None = None) -> bytes:
     """Read a whole file.
 
@@ -238,10 +265,8 @@ def read_bytes(path: Path, *, most_bytes: int | None = None) -> bytes:
     FileFormatError
         If it is missing, is no file, is too large, or cannot be read.
     """
-    size = require_regular_file(path)
     limit = _memory_bytes() if most_bytes is None else most_bytes
-    if size > limit:
-        raise _too_large(path, size, limit)
+    size = require_size(path, most_bytes=limit)
     with open_input(path) as stream:
         try:
             data = stream.read(size + 1)  # not of the limit: as many bytes as are asked for are allocated

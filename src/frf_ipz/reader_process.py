@@ -27,7 +27,7 @@ from typing import IO, TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from frf_ipz.errors import FileFormatError
-from frf_ipz.input_files import BLOCK_BYTES, open_input, require_expanded
+from frf_ipz.input_files import BLOCK_BYTES, open_input, require_expanded, require_size
 from frf_ipz.json_files import parse_json
 from frf_ipz.output_files import write_bytes
 
@@ -127,7 +127,7 @@ class _Reader:
     def read(self, path: Path, module: str, *, kind: str, most_bytes: int) -> FileContents:
         """Ask for the contents of a file."""
         with self._lock, open_input(path) as stream:
-            file_bytes = path.stat().st_size
+            file_bytes = require_size(path)
             process = self._started()
             clock = _Clock(process, LONGEST_S + file_bytes / BYTES_PER_S)
             try:

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from frf_ipz import reader_process
+from frf_ipz import input_files, reader_process
 from frf_ipz.errors import FileFormatError
 from frf_ipz.reader_process import read_in_process
 
@@ -115,10 +115,20 @@ def test_what_a_file_does_to_its_reader_is_one_error_and_the_next_is_read(ask, w
 
 
 def test_a_file_that_keeps_its_reader_is_one_error_and_the_next_is_read(ask, monkeypatch):
-    with monkeypatch.context() as patched, pytest.raises(FileFormatError, match="keeps the library that reads it for more than 2 s"):
+    with (
+        monkeypatch.context() as patched,
+        pytest.raises(FileFormatError, match="the library that reads it for more than 2 s"),
+    ):
         patched.setattr(reader_process, "LONGEST_S", 2.0)
         ask("sleep")
     assert ask("x").said["word"] == "x"
+
+
+def test_a_file_that_does_not_fit_into_the_memory_is_refused_before_it_is_read(ask, monkeypatch):
+    monkeypatch.setattr(input_files, "_memory_bytes", lambda: 3)
+    with pytest.raises(FileFormatError, match=r"file\.DAT: "):
+        ask("words")
+    assert ask("abc").said["word"] == "abc"
 
 
 def test_what_a_library_prints_is_no_answer(ask):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.foreign_errors import require_reader
+from frf_ipz.input_files import require_size
 from frf_ipz.meshes.mesh_file import MOST_BYTES, MeshFormat, StoredMesh
 from frf_ipz.meshes.outer_faces import (
     CORNERS,
@@ -34,6 +35,7 @@ TETRAHEDRA = {72, 87, 92, 98, 123, 127, 148, 168, 187, 227, 232, 237, 285, 291}
 
 def _read(path: Path) -> StoredMesh:
     require_reader(path, "mapdl_archive", kind=KIND, extra="mesh")
+    require_size(path, most_bytes=MOST_BYTES)
     arrays = read_in_process(path, PROCESS, kind=KIND, most_bytes=MOST_BYTES).arrays
     places = zip(arrays["nodes"].tolist(), arrays["positions"].tolist(), strict=True)
     kinds = dict(arrays["kinds"].tolist())

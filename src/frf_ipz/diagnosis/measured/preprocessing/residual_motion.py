@@ -339,6 +339,8 @@ class _Misfit:
 
     Parameters
     ----------
+    units : list of (n_lines / FINER, n_terms) complex array
+        Terms of amplitude 1 of each record.
     variance : (n_lines / FINER, n_records) array
         Of the lines, by noise and by errors of the model.
     std : float
@@ -349,6 +351,7 @@ class _Misfit:
         That show it.
     """
 
+    units: list[ComplexArray]
     variance: FloatArray
     std: float
     noise: Noise
@@ -367,6 +370,7 @@ def _misfit(group: _Group, row: int, amplitudes: list[FloatArray], least_noise: 
     of_model = (MODEL_ERROR * np.abs(rest)) ** 2
     gain = np.full(len(energy), 0.5 / group.lines.s.real[0])
     return _Misfit(
+        units=units,
         variance=energy[:, None] + of_model,
         std=float(np.sqrt(np.median(energy) * per_square)),
         noise=fit_noise(group.lines.frequency_hz[::FINER], energy, gain, np.mean(of_model, axis=1)),
@@ -379,20 +383,19 @@ def _normal_equations(
 ) -> _NormalEquations:
     """Gather what lines and the samples before impacts tell; of a single record, no line tells anything."""
     before = [record.responses[row, : pulse.start] for record, pulse in zip(group.records, group.pulses, strict=True)]
-    units = [group.unit_spectra(record) for record in group.records]
-    n = sum(unit.shape[1] for unit in units)
+    n_terms = tuple(group.n_terms(record) for record in group.records)
     if misfit is None:
-        of_lines = np.zeros((n, n)), np.zeros(n)
+        of_lines = np.zeros((sum(n_terms),) * 2), np.zeros(sum(n_terms))
         best = max(shown, key=lambda misfit: misfit.n_records, default=None)
         std, noise = (best.std, best.noise) if best else _noise_before(before, group.records[0].step_s, least_noise)
     else:
-        of_lines = _equations_of_lines(group, row, units, misfit.variance)
+        of_lines = _equations_of_lines(group, row, misfit)
         std, noise = misfit.std, misfit.noise
     quiet = [
         _equations_before(group, record, samples, noise) for record, samples in zip(group.records, before, strict=True)
     ]
     return _NormalEquations(
-        n_terms=tuple(unit.shape[1] for unit in units),
+        n_terms=n_terms,
         noise=std,
         curvature=of_lines[0] + block_diag(*(curvature for curvature, _ in quiet)),
         slope=of_lines[1] + np.concatenate([slope for _, slope in quiet]),
@@ -405,12 +408,10 @@ def _noise_before(before: list[FloatArray], step_s: float, least_noise: float) -
     return std, Noise(white=std**2 * step_s)
 
 
-def _equations_of_lines(
-    group: _Group, row: int, units: list[ComplexArray], variance: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _equations_of_lines(group: _Group, row: int, misfit: _Misfit) -> tuple[FloatArray, FloatArray]:
     """Curvature and slope by the lines, on each of which the FRF is free."""
-    response, force = group.lines.responses[::FINER, :, row], group.lines.force[::FINER]
-    weight = 1 / (lines_of_one_number(group.lines.s[::FINER], group.duration_s) * variance)
+    response, force, units = group.lines.responses[::FINER, :, row], group.lines.force[::FINER], misfit.units
+    weight = 1 / (lines_of_one_number(group.lines.s[::FINER], group.duration_s) * misfit.variance)
     shared = weight * force / np.sqrt(np.sum(weight * np.abs(force) ** 2, 1))[:, None]
     across = np.hstack([column[:, None].conj() * unit for column, unit in zip(shared.T, units, strict=True)])
     along = np.sum(shared.conj() * response, 1)

@@ -11,7 +11,7 @@ from scipy import sparse
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.matrices.stored import MOST_BYTES, MatrixFormat, MatrixRequest, StoredMatrix, both_triangles
-from frf_ipz.input_files import digest_file
+from frf_ipz.input_files import digest_file, require_size
 from frf_ipz.reader_process import read_in_process
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def _is_installed() -> bool:
 def _arrays(path: Path, digest: str) -> Any:  # noqa: ANN401 - named arrays
     """Let another process read the file: a damaged one ends it."""
     del digest
+    require_size(path, most_bytes=MOST_BYTES)
     return read_in_process(path, PROCESS, kind="a .full file of Ansys", most_bytes=MOST_BYTES).arrays
 
 
