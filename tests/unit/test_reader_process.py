@@ -1,7 +1,9 @@
 """What is read in another process arrives as it was read, and what ends or keeps that process is one error."""
 
 import os
+import signal
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -154,12 +156,28 @@ def test_nothing_in_the_users_folder_is_taken_for_a_module(ask, tmp_path, monkey
     assert ask("x").said["word"] == "x"
 
 
+def exit_code_of(process, longest_s=10.0):
+    """Wait for a child, and kill it where it takes too long."""
+    end = time.monotonic() + longest_s
+    while time.monotonic() < end:
+        ended, status = os.waitpid(process, os.WNOHANG)
+        if ended:
+            return os.waitstatus_to_exitcode(status)
+        time.sleep(0.01)
+    os.kill(process, signal.SIGKILL)
+    return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+
+
 def test_a_forked_process_has_a_reader_of_its_own(ask):
     ours = reader_process._reader_of(os.getpid())
     first = ask("x").said["process"]
     child = os.fork()
     if child == 0:
-        ours.end()  # as at the end of the process
-        os._exit(10 if ask("y").said["process"] != first else 1)
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 10
+        code = 1
+        try:
+            ours.end()  # as at the end of the process
+            code = 10 if ask("y").said["process"] != first else 1
+        finally:
+            os._exit(code)  # whatever was raised: the tests after this one are the parent's
+    assert exit_code_of(child) == 10
     assert ask("z").said["process"] == first
