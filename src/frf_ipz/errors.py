@@ -113,6 +113,11 @@ class FileFormatError(InputError):
         where = _without_middle(where, MOST_LETTERS // 8)
         super().__init__(f"{path}{f', {where}' if where else ''}: {_without_middle(problem, MOST_LETTERS)}")
 
+    @property
+    def parts(self) -> tuple[FileFormatError, ...]:
+        """What is wrong with each of several places in the file; by default the error itself."""
+        return (self,)
+
 
 def _without_middle(text: str, most: int) -> str:
     """Leave out what lies in the middle of a text that is too long."""

@@ -19,7 +19,7 @@ from frf_ipz.errors import FileFormatError, InputError, did_you_mean
 from frf_ipz.input_files import read_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
     from pathlib import Path
 
 STRICT: dict[str, Any] = {"extra": "forbid", "arbitrary_types_allowed": True}
@@ -31,6 +31,77 @@ CLASS_NAME = re.compile(r"(?:[A-Z][a-z]+){2,}")  # a dataclass that is a branch 
 REPORTED_FIRST = ("unexpected_keyword_argument", "missing")
 
 Options = TypeVar("Options")
+
+
+class WrongKeysError(FileFormatError):
+    """Several keys of a file do not fit.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    problems : mapping of str to str
+        What is wrong, by its place.
+    """
+
+    def __init__(self, path: Path, problems: Mapping[str, str]) -> None:
+        self._problems = dict(problems)
+        shown = numbered(f"{where}: {problem}" for where, problem in problems.items())
+        super().__init__(path, f"{len(problems)} keys do not fit: {shown}")
+
+    @property
+    def parts(self) -> tuple[FileFormatError, ...]:
+        """One error a key."""
+        return tuple(FileFormatError(self.path, text, where=where) for where, text in self._problems.items())
+
+
+def numbered(texts: Iterable[str]) -> str:
+    """List what is wrong in several places, in one line.
+
+    Parameters
+    ----------
+    texts : iterable of str
+        One a place.
+
+    Returns
+    -------
+    str
+        The first of them, each behind its number, and how many more there are.
+
+    Examples
+    --------
+    >>> numbered(["a: 1", "b: 2"])
+    '(1) a: 1; (2) b: 2'
+    """
+    shown = [f"({number}) {text}" for number, text in enumerate(texts, start=1)]
+    more = len(shown) - MOST_SHOWN
+    return "; ".join([*shown[:MOST_SHOWN], *([f"and {more} more"] if more > 0 else [])])
+
+
+def error_of_all(error: FileFormatError, checks: Iterable[Callable[[], object]]) -> InputError:
+    """Say at once what is wrong with several files, so that they are corrected in one go.
+
+    Parameters
+    ----------
+    error : FileFormatError
+        What was met first.
+    checks : iterable of functions
+        Each reads the keys of one file, and raises what is wrong with it.
+
+    Returns
+    -------
+    InputError
+        The error itself, unless there is one of another file too.
+    """
+    errors = [error]
+    for check in checks:
+        try:
+            check()
+        except FileFormatError as another:
+            errors.append(another)
+    parts = {str(part): part.path for found in errors for part in found.parts}
+    n_files = len(set(parts.values()))
+    return error if n_files == 1 else InputError(f"{len(parts)} mistakes in {n_files} files: {numbered(parts)}")
 
 
 def read_toml(path: Path, options_type: type[Options], *, required: str = "") -> Options:
@@ -129,10 +200,7 @@ def to_options(table: Mapping[str, Any], options_type: type[Options], path: Path
     if len(problems) == 1:
         ((where, problem),) = problems.items()
         raise FileFormatError(path, problem, where=where)
-    shown = [f"({number}) {where}: {problem}" for number, (where, problem) in enumerate(problems.items(), start=1)]
-    more = len(shown) - MOST_SHOWN
-    rest = [f"and {more} more"] if more > 0 else []
-    raise FileFormatError(path, f"{len(shown)} keys do not fit: {'; '.join([*shown[:MOST_SHOWN], *rest])}")
+    raise WrongKeysError(path, problems)
 
 
 def check_values(options: object) -> None:

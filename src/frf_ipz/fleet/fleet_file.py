@@ -6,22 +6,24 @@ import re
 from collections import Counter
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import tomlkit
 
 from frf_ipz.errors import FileFormatError, InputError, did_you_mean
+from frf_ipz.fe.model_file import model_files
 from frf_ipz.fleet.machine_list import COLUMNS, read_machine_list
 from frf_ipz.input_files import read_text, require_regular_file
 from frf_ipz.option_types import Day
 from frf_ipz.output_files import write_text
 from frf_ipz.pipeline.config import PipelineFile, StageOptions
 from frf_ipz.pipeline.pipeline_folder import find_pipeline
-from frf_ipz.toml_files import STRICT, parse_toml, read_toml, to_options
+from frf_ipz.toml_files import STRICT, error_of_all, parse_toml, read_toml, to_options
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
 STAGES = tuple(item.name for item in fields(StageOptions))
 PARTICULARS = tuple(name for name in COLUMNS if name not in {"id", "test"})
@@ -237,16 +239,45 @@ def read_fleet(path: Path) -> Fleet:
     ------
     FileFormatError
         If the file, or a key in it, is wrong; if no machine is found, or two have one id.
+    InputError
+        If keys of the pipeline or of the model are wrong too.
     """
+    try:
+        return _read_fleet(path)
+    except FileFormatError as error:
+        raise _wrong_keys_of_all(error, path) from None
+
+
+def _wrong_keys_of_all(error: FileFormatError, path: Path) -> InputError:
+    """Say what is wrong with the keys of the fleet, of its pipeline and of its model at once."""
+    checks: list[Callable[[], object]] = [partial(read_toml, path, FleetFile, required="fleet")]
+    try:
+        section = parse_toml(read_text(path), path).get("fleet")
+    except FileFormatError:
+        section = None
+    named = section if isinstance(section, dict) else {}
+    for key, read in (("pipeline", _read_settings), ("model", model_files)):
+        file = path.resolve().parent / named[key] if isinstance(named.get(key), str) else None
+        if file is not None and file.is_file():
+            checks.append(partial(read, file))
+    return error_of_all(error, checks)
+
+
+def _read_settings(pipeline: Path) -> dict[str, Any]:
+    """Read what a pipeline says for all machines; what is wrong is said of the file in which it stands."""
+    settings = parse_toml(read_text(pipeline), pipeline)
+    to_options({**settings, "pipeline": {"test": "test.toml"}}, PipelineFile, pipeline)
+    return settings
+
+
+def _read_fleet(path: Path) -> Fleet:
     file = read_toml(path, FleetFile, required="fleet")
     path = path.resolve()
     section = file.fleet
     with _named_by(path, "fleet.pipeline"):
         pipeline = find_pipeline(path.parent / section.pipeline)
         require_regular_file(pipeline)
-    settings = parse_toml(read_text(pipeline), pipeline)
-    # what is wrong for all is said of the file in which it stands
-    to_options({**settings, "pipeline": {"test": "test.toml"}}, PipelineFile, pipeline)
+    settings = _read_settings(pipeline)
     model = None if section.model is None else (path.parent / section.model).resolve()
     if model is not None:
         with _named_by(path, "fleet.model"):

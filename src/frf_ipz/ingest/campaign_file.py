@@ -301,6 +301,27 @@ class CampaignFileKeys:
     modes: tuple[ModesKeys, ...] = ()
 
 
+def read_test_keys(path: Path) -> CampaignFileKeys:
+    """Read what a test says, and no file that it names.
+
+    Parameters
+    ----------
+    path : Path
+        ``test.toml``.
+
+    Returns
+    -------
+    CampaignFileKeys
+        Its keys, each for itself.
+
+    Raises
+    ------
+    FileFormatError
+        If keys are wrong or missing.
+    """
+    return read_toml(path.resolve(), CampaignFileKeys, required="test")
+
+
 def read_test(path: str | Path) -> VibrationTest:
     """Read a test.
 
@@ -344,7 +365,7 @@ def read_test(path: str | Path) -> VibrationTest:
     ['11:+z / 6:+z']
     """
     path = require_file(path).resolve()
-    keys = read_toml(path, CampaignFileKeys, required="test")
+    keys = read_test_keys(path)
     _check_sections(path, keys)
     channels = _read_channels(path, keys)
     entries = keys.hit or keys.record

@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from frf_ipz.diagnosis.options import DiagnoseOptions
+from frf_ipz.errors import InputError
 from frf_ipz.export.options import ExportOptions
+from frf_ipz.fe.model_file import model_files
 from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.identification.options import FitOptions
+from frf_ipz.ingest.campaign_file import read_test_keys
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.input_files import read_text
 from frf_ipz.pipeline.pipeline_folder import find_pipeline
 from frf_ipz.prediction.options import PredictOptions
-from frf_ipz.toml_files import STRICT, read_toml
+from frf_ipz.toml_files import STRICT, error_of_all, parse_toml, read_toml
 from frf_ipz.updating.options import UpdateOptions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from frf_ipz.errors import FileFormatError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +112,34 @@ class Pipeline:
     def name(self) -> str:
         """What the run is called; the file's name where it says nothing."""
         return self.file.pipeline.name or self.path.stem
+
+
+def wrong_keys_of_all(error: FileFormatError, path: Path) -> InputError:
+    """Say what is wrong with the keys of a pipeline, of its test and of its model at once.
+
+    Parameters
+    ----------
+    error : FileFormatError
+        What was met first.
+    path : Path
+        The pipeline file, or a folder that holds exactly one.
+
+    Returns
+    -------
+    InputError
+        The error itself, unless there is one of another file too.
+    """
+    checks: list[Callable[[], object]] = [partial(read_pipeline, path)]
+    try:
+        path = find_pipeline(path)
+        section = parse_toml(read_text(path), path).get("pipeline")
+    except InputError:
+        section = None
+    named = section if isinstance(section, dict) else {}
+    for key, read in (("test", read_test_keys), ("model", model_files)):
+        if isinstance(named.get(key), str):
+            checks.append(partial(read, path.resolve().parent / named[key]))
+    return error_of_all(error, checks)
 
 
 def read_pipeline(path: Path) -> Pipeline:

@@ -13,7 +13,7 @@ from frf_ipz.fe.model_file import model_files, read_model
 from frf_ipz.ingest.campaign_file import bind_ports, read_test
 from frf_ipz.ingest.estimation.frf_files import read_frfs
 from frf_ipz.input_files import Ledger, digest_file, entering
-from frf_ipz.pipeline.config import StageOptions, read_pipeline
+from frf_ipz.pipeline.config import StageOptions, read_pipeline, wrong_keys_of_all
 from frf_ipz.pipeline.sensors import without_sensors
 from frf_ipz.pipeline.shared_model import SharedModel
 
@@ -128,11 +128,15 @@ def read_inputs(path: Path, *, shared: SharedModel | None = None) -> PipelineInp
     Raises
     ------
     InputError
-        On the first thing that is wrong: which file, which place, what was expected.
+        On the first thing that is wrong, and on all keys of all files that are: which file, which place, what was
+        expected.
     """
     ledger = Ledger() if shared is None else shared.ledger()
     with entering(ledger):
-        return _read_inputs(path, ledger, shared)
+        try:
+            return _read_inputs(path, ledger, shared)
+        except FileFormatError as error:
+            raise wrong_keys_of_all(error, path) from None
 
 
 def _read_inputs(path: Path, ledger: Ledger, shared: SharedModel | None) -> PipelineInputs:

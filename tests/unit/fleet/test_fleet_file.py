@@ -115,6 +115,22 @@ def test_a_wrong_key_for_all_is_said_of_the_pipeline(folder):
         fleet_of(folder, HEAD + 'machines = "machines/*/test.toml"\n')
 
 
+def test_wrong_keys_of_all_files_are_said_at_once(folder):
+    (folder / "pipeline.toml").write_text(PIPELINE.replace("band_hz", "band_Hz"))
+    (folder / "model.toml").write_text(MODEL.replace("width_m", "widht_m"))
+    with pytest.raises(InputError) as error:
+        fleet_of(folder, HEAD + 'machinse = "machines/*/test.toml"\n')
+    message = str(error.value)
+    assert message.startswith("3 mistakes in 3 files: (1) ")
+    for words in (
+        "fleet.toml, key 'fleet.machinse'",
+        "pipeline.toml, key 'fit.band_Hz'",
+        "model.toml, key 'beam.widht",
+    ):
+        assert words in message
+    assert "\n" not in message
+
+
 @pytest.mark.parametrize("name", ["a/b", "..", "a:b", " a", "a.", "CON", "nul.txt", "a\\b", "x" * 101, "a\tb", ""])
 def test_an_id_that_no_folder_can_have_is_refused(folder, name):
     with pytest.raises(InputError, match="is no name that a folder can have"):
