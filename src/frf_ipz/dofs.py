@@ -13,6 +13,7 @@ TRANSLATIONS = ("x", "y", "z")
 DIRECTIONS = (*TRANSLATIONS, "rx", "ry", "rz")
 GENERALISED = "q"  # the amplitude of a mode or of a super-element's motion, which has no direction
 UNITS = ("m", "rad")
+GROUND = 0  # the node that does not move
 DOFS_SHOWN = 6
 _LABEL = re.compile(r"^\s*([0-9]{1,18})\s*:\s*([+-]?)\s*(r?[xyz])\s*$")
 _LABELS_WITHIN = re.compile(r"\d+:[-+]?r?[xyz]")
@@ -193,7 +194,7 @@ def as_dof(dof: AnyDof | Port | str) -> AnyDof:
     Raises
     ------
     InputError
-        If a text is no such label.
+        If a text is no such label, or the DOF is one of the ground.
 
     Examples
     --------
@@ -202,7 +203,9 @@ def as_dof(dof: AnyDof | Port | str) -> AnyDof:
     """
     if isinstance(dof, Port):
         return dof.dof
-    return dof if isinstance(dof, Dof | PortDof) else parse_label(dof)
+    if isinstance(dof, PortDof):
+        return dof
+    return _require_motion(dof) if isinstance(dof, Dof) else parse_label(dof)
 
 
 def as_dofs(dofs: Sequence[AnyDof | Port | str], *, name: str = "points") -> tuple[AnyDof, ...]:
@@ -223,7 +226,7 @@ def as_dofs(dofs: Sequence[AnyDof | Port | str], *, name: str = "points") -> tup
     Raises
     ------
     InputError
-        If it is no sequence, or a text in it is no label.
+        If it is no sequence, a text in it is no label, or a DOF is one of the ground.
 
     Examples
     --------
@@ -273,7 +276,7 @@ def parse_label(text: str) -> AnyDof:
     Raises
     ------
     InputError
-        If the text is neither.
+        If the text is neither, or the DOF is one of the ground.
 
     Examples
     --------
@@ -283,8 +286,17 @@ def parse_label(text: str) -> AnyDof:
     stripped = text.strip() if isinstance(text, str) else ""
     name = stripped[1:].strip() if stripped[:1] in ("+", "-") else stripped
     if _PORT.fullmatch(name) is None:
-        return parse_dof(text)
+        return _require_motion(parse_dof(text))
     return PortDof(name, -1 if stripped.startswith("-") else 1)
+
+
+def _require_motion(dof: Dof) -> Dof:
+    """Refuse the ground, where nothing moves and no force does anything."""
+    if dof.node == GROUND:
+        raise InputError(
+            f"'{dof}' is at node {GROUND}, which is the ground; name the node of the sensor or of the force"
+        )
+    return dof
 
 
 def bind_port(dof: AnyDof, ports: Mapping[PortDof, PortDof]) -> AnyDof:

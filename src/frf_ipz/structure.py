@@ -18,7 +18,7 @@ from scipy import sparse
 from frf_ipz.arguments import require_choice, take_array
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray, Matrix, require_finite, require_shape
 from frf_ipz.display import Concise, Drawn
-from frf_ipz.dofs import GENERALISED, AnyDof, Dof, Port, PortDof, as_dofs, bind_port, parse_dof
+from frf_ipz.dofs import GENERALISED, GROUND, AnyDof, Dof, Port, PortDof, as_dofs, bind_port, parse_dof
 from frf_ipz.errors import InputError, ShapeError
 from frf_ipz.numerics.constraints import AdmissibleMotions
 from frf_ipz.numerics.neighbours import lines_between_neighbours
@@ -37,7 +37,6 @@ DOFS_SHOWN = 6
 MOST_PLACES = 8  # models whose DOFs are found by name at once
 HELD = ("auto", "keep")
 GENERALISED_LABEL = re.compile(r"\s*([0-9]{1,18})\s*:\s*[q0]\s*")
-GROUND = 0  # the node that does not move
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)

@@ -31,7 +31,6 @@ from frf_ipz.ingest.units import sensitivity_factor, unit_factor
 from frf_ipz.meshes.registry import read_mesh
 from frf_ipz.option_types import Count, CountOrNone, Day, NotNegative, Positive, Ratio
 from frf_ipz.quantities import RECIPROCALS, FrfQuantity
-from frf_ipz.structure import GROUND
 from frf_ipz.toml_files import STRICT, read_toml
 
 if TYPE_CHECKING:
@@ -723,14 +722,8 @@ def _parse_dofs(path: Path, texts: str | tuple[str, ...] | None, where: str) -> 
 
 
 def _parse_dof(path: Path, text: str, where: str) -> AnyDof:
-    try:
-        dof = parse_label(text)
-    except InputError as error:
-        raise FileFormatError(path, str(error), where=where) from None
-    if isinstance(dof, Dof) and dof.node == GROUND:
-        problem = f"'{text}' is at node {GROUND}, which is the ground; name the node of the sensor or of the force"
-        raise FileFormatError(path, problem, where=where)
-    return dof
+    with errors_of_file(path, where=where):
+        return parse_label(text)
 
 
 def _expand_pattern(path: Path, pattern: str, where: str) -> list[Path]:

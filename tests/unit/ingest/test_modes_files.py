@@ -76,7 +76,7 @@ def test_modes_at_the_ground_are_refused(tmp_path):
         universal(stated_modes(1)).replace(f"\n{stated_modes(1).dofs[0].node:10d}\n", f"\n{0:10d}\n")
     )
     for name in ("modes.csv", "modes.unv"):
-        with pytest.raises(frf_ipz.InputError, match=rf"{name}.* has the DOF 0:\+z, and node 0 is the ground"):
+        with pytest.raises(frf_ipz.InputError, match=rf"{name}.*'0:\+z' is at node 0, which is the ground"):
             read(tmp_path / name)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from frf_ipz.dofs import Dof
+from frf_ipz.dofs import GROUND, Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.assembly import assemble, assemble_mass_and_stiffness, stated_damping
 from frf_ipz.fe.model_options import DampingSection, ModelSection, PortSection
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import IntArray
 
 KIND = "lumped"
-GROUND = 0
 DIFFERENCE = np.array([[1.0, -1.0], [-1.0, 1.0]])
 
 

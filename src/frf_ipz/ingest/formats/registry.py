@@ -9,21 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frf_ipz.dofs import Dof
-from frf_ipz.errors import FileFormatError
+from frf_ipz.dofs import as_dofs
+from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.ingest import formats
 from frf_ipz.ingest.formats.file_arrays import ArrayFormat
 from frf_ipz.ingest.formats.frf_file import FrfFormat
 from frf_ipz.ingest.formats.modes_file import ModesFormat
 from frf_ipz.ingest.formats.recording import LARGEST, RecordingFormat, TableKeys
 from frf_ipz.ingest.formats.text_layout import read_head
-from frf_ipz.structure import GROUND
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from frf_ipz.dofs import AnyDof
     from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf
     from frf_ipz.ingest.formats.modes_file import ModesSource
     from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents
@@ -83,7 +81,8 @@ def read_frf_file(source: FrfSource) -> tuple[MeasuredFrf, ...]:
         if candidate.holds(source, head):
             frfs: tuple[MeasuredFrf, ...] = candidate.read(source)
             for frf in frfs:
-                _require_motion(source.path, (frf.output_dof, frf.input_dof))
+                with errors_of_file(source.path):
+                    as_dofs((frf.output_dof, frf.input_dof))
                 _require_sizes(frf)
             return frfs
     raise FileFormatError(
@@ -203,22 +202,14 @@ def read_modes_file(source: ModesSource) -> ModalParameters:
     head = read_head(source.path)
     for candidate in _formats(ModesFormat):
         if candidate.holds_modes(source.path, head):
-            modes: ModalParameters = candidate.read_modes(source)
-            _require_motion(source.path, modes.dofs)
+            with errors_of_file(source.path):
+                modes: ModalParameters = candidate.read_modes(source)
             return modes
     raise FileFormatError(
         source.path,
         "is of no known format for modes; expected is a universal file with data sets 55 or 2414, or a CSV with the "
         "columns mode,frequency_hz,damping_ratio,dof,real,imag",
     )
-
-
-def _require_motion(path: Path, dofs: Sequence[AnyDof]) -> None:
-    """Refuse what was measured at the ground."""
-    for dof in dofs:
-        if isinstance(dof, Dof) and dof.node == GROUND:
-            problem = f"has the DOF {dof}, and node {GROUND} is the ground"
-            raise FileFormatError(path, f"{problem}; name the node of the sensor or of the force")
 
 
 def _require_sizes(frf: MeasuredFrf) -> None:
