@@ -306,12 +306,12 @@ def _read(path: Path, keys: TableKeys) -> RecordedSignals:
     contents = look_at_recording(path, keys)
     columns = [column for column in contents.columns if column.name != keys.time_column]
     recording = open_recording(path, [column.name for column in columns], keys)
-    time_check = UniformTimeCheck(recording)
     blocks = []
     factor = unit_factor(recording.units[0], "time") if recording.units[0] else 1.0
+    time_check = UniformTimeCheck(recording, factor)
     for block in recording.blocks:
-        block[:, 0] *= factor
         time_check.add(block[:, 0])
+        block[:, 0] *= factor
         blocks.append(block)
     time_check.finish()
     table = np.concatenate(blocks)

@@ -13,6 +13,7 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.ingest.formats.registry import open_recording
+from frf_ipz.ingest.formats.time_stamps import resolution_of
 from frf_ipz.ingest.signals.alignment import AGREES, Alignment, align, join
 from frf_ipz.ingest.units import is_stated, sensitivity_factor, unit_factor, unit_ratio
 
@@ -164,10 +165,10 @@ class RecordingFiles:
             _channel_factor(path, self.test.channels[place], dofs[place], file_unit)
             for place, file_unit in zip(places, recording.units[1:], strict=True)
         ]
-        time_check = UniformTimeCheck(recording)
+        time_check = UniformTimeCheck(recording, factors[0])
         for block in recording.blocks:
-            block *= factors  # in place: the block is ours, and copies cost time
             time_check.add(block[:, 0])
+            block *= factors  # in place: the block is ours, and copies cost time
             yield block
         time_check.finish()
 
@@ -219,9 +220,13 @@ class UniformTimeCheck:
     ----------
     recording : RawRecording
         What is read, for messages.
+    factor : float
+        From the unit of its times to s.
     """
 
-    def __init__(self, recording: RawRecording) -> None:
+    def __init__(self, recording: RawRecording, factor: float) -> None:
+        self._factor = factor
+        self._resolution = 0.0
         self._path = recording.path
         self._line_of_row = recording.line_of_row
         self._row_name = recording.row_name
@@ -236,25 +241,29 @@ class UniformTimeCheck:
         Parameters
         ----------
         time : (n_rows,) array
-            s.
+            As the file gives them.
 
         Raises
         ------
         FileFormatError
             If a step is not the median one: names the row.
         """
-        steps = np.diff(time, prepend=self._last) if self._n_rows else np.diff(time)
+        steps = self._factor * (np.diff(time, prepend=self._last) if self._n_rows else np.diff(time))
         if self._n_rows == 0 and steps.size:
             self._median = float(np.median(steps))
-        wrong = ~(np.abs(steps - self._median) <= UNIFORM * abs(self._median)) | (steps <= 0.0)
+            self._resolution = self._factor * resolution_of(time)
+        can_tell = 2.0 * self._resolution < self._median  # a sample that is lost from rounding
+        tolerance = UNIFORM * abs(self._median) + (self._resolution if can_tell else 0.0)
+        wrong = ~(np.abs(steps - self._median) <= tolerance) | (steps <= 0.0)
         if wrong.any():
+            coarse = f"its times are rounded to {self._resolution:.2g} s, and " if not can_tell else ""
             position = int(np.argmax(wrong))
             row = self._n_rows + position + (self._n_rows == 0)
             raise FileFormatError(
                 self._path,
-                f"the time is not uniform: a step is {steps[position]:.6g} s where the median is {self._median:.6g} s; "
-                "record with a constant rate, write the time with more digits, or resample; where only the digits of "
-                "the time are too few, write sample_rate_hz = ... under [test]",
+                f"the time is not uniform: {coarse}a step is {steps[position]:.6g} s where the median is "
+                f"{self._median:.6g} s; record with a constant rate, write the time with more digits, or resample; "
+                "where only the digits of the time are too few, write sample_rate_hz = ... under [test]",
                 where=f"{self._row_name} {self._line_of_row(row)}, column '{self._column}'",
             )
         self._n_rows += len(time)

@@ -209,3 +209,24 @@ def test_a_lone_frequency_beside_signals_is_their_rate(tmp_path):
     )
     expect(table)
     assert "2048 samples a second by 'freq'" in notes[0]
+
+
+DAY_S = 86400.0
+
+
+@pytest.mark.parametrize("name", ["v7.mat", "some.npz"])
+@pytest.mark.parametrize(
+    ("times", "rounded_s"),
+    [
+        (738000.5 + TIME / DAY_S, np.spacing(738000.5) * DAY_S),
+        (1.7e9 + TIME / 25.0, np.spacing(1.7e9)),
+        (np.rint(1.7e15 + 1e6 * TIME), 1e-6),
+    ],
+    ids=["datenum", "s since 1970, 51.2 kHz", "whole us since 1970"],
+)
+def test_times_since_a_date_give_their_rate(tmp_path, name, times, rounded_s):
+    arrays = {"t": times, "force": SIGNALS[0], "first": SIGNALS[1], "second": SIGNALS[2]}
+    WRITERS[name](tmp_path / name, arrays)
+    table, _ = read(tmp_path / name)
+    expected = TIME / 25.0 if times[0] == 1.7e9 else TIME
+    np.testing.assert_allclose(table[:, 0] - table[0, 0], expected, atol=2 * rounded_s, rtol=0)

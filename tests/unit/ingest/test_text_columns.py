@@ -195,6 +195,81 @@ def test_times_since_1970_are_read_in_the_unit_that_makes_them_dates(tmp_path, f
     np.testing.assert_allclose(table[:, 0] - table[0, 0], np.arange(N_SAMPLES) / RATE_HZ, atol=1.1 * PRINTED_S, rtol=0)
 
 
+DAY_S = 86400.0
+COUNTED = {  # first count, counts a second
+    "days since 1900, Excel": (45912.512345, 1 / DAY_S),
+    "days since 1970": (20410.512345, 1 / DAY_S),
+    "days since the year 0, MATLAB": (740000.512345, 1 / DAY_S),
+    "Julian days": (2461000.012345, 1 / DAY_S),
+    "s since 1970": (1762163939.123, 1.0),
+    "s since 1904, LabVIEW": (3845008739.123, 1.0),
+    "whole us since 1970": (1762163939123456, 1e6),
+    "whole ns since 1970": (1762163939123456000, 1e9),
+    "0.1 us since 1601, Windows": (134066375391234560, 1e7),
+    "0.1 us since the year 1, .NET": (638977607391234560, 1e7),
+}
+
+
+def counted(kind, rate_hz, name="Timestamp"):
+    """Write times as a program that counts in double precision, or in whole numbers."""
+    start, per_s = COUNTED[kind]
+
+    def make(number, fields):
+        count = start + number / rate_hz * per_s
+        return ",".join([str(round(count)) if isinstance(start, int) else repr(count), *fields[1:]])
+
+    return lambda text: named(name)(lines_with(make)(text))
+
+
+@pytest.mark.parametrize("rate_hz", [200.0, 2048.0, 12800.0])
+@pytest.mark.parametrize("kind", COUNTED)
+def test_times_since_a_date_give_their_rate_however_they_are_rounded(tmp_path, kind, rate_hz):
+    spacing_s = np.spacing(float(COUNTED[kind][0])) / COUNTED[kind][1]
+    path = write(tmp_path, counted(kind, rate_hz))
+    if 2.0 * spacing_s * rate_hz > 1.0:  # Julian days are 40 us apart
+        assert "its times are rounded to 4e-05 s" in message(path)
+        table = read(path, f"sample_rate_hz = {rate_hz}")
+    else:
+        table = read(path)
+    rounded_s = max(spacing_s, 1.0 / COUNTED[kind][1] if isinstance(COUNTED[kind][0], int) else 0.0)
+    np.testing.assert_allclose(table[:, 0] - table[0, 0], np.arange(N_SAMPLES) / rate_hz, atol=2 * rounded_s, rtol=0)
+
+
+@pytest.mark.parametrize("kind", ["days since 1900, Excel", "days since the year 0, MATLAB", "s since 1970"])
+def test_a_lost_sample_is_told_from_rounding(tmp_path, kind):
+    def lose(text):
+        lines = counted(kind, 12800.0)(text).splitlines(keepends=True)
+        return "".join([*lines[:100], *lines[101:]])
+
+    assert re.search(r"the time is not uniform: a step is 0\.0001[4-7]", message(write(tmp_path, lose)))
+
+
+def test_seconds_of_a_day_are_no_days(tmp_path):
+    late = lines_with(lambda number, fields: ",".join([repr(45912.5 + number / RATE_HZ), *fields[1:]]))
+    table = read(write(tmp_path, late))
+    np.testing.assert_allclose(table[:, 0], 45912.5 + np.arange(N_SAMPLES) / RATE_HZ, rtol=DIGITS)
+
+
+def test_what_may_be_days_or_seconds_is_asked_for(tmp_path):
+    """At 20 Hz in days; in seconds that were 1.7 MHz."""
+    path = write(tmp_path, counted("days since 1900, Excel", 20.0))
+    asked = r"'Timestamp'.*: its times .* of 20 samples .* name the unit, as in 'time \[d\]', or write sample_rate_hz"
+    assert re.search(asked, message(path))
+    stated = read(path, "sample_rate_hz = 20.0")
+    named_so = read(write(tmp_path, counted("days since 1900, Excel", 20.0, "time [d]")))
+    for table in (stated, named_so):
+        np.testing.assert_allclose(table[:, 0] - table[0, 0], np.arange(N_SAMPLES) / 20.0, atol=2e-6, rtol=0)
+
+
+def test_serial_days_of_too_few_digits_need_a_rate(tmp_path):
+    start, per_s = COUNTED["days since 1900, Excel"]
+    path = write(
+        tmp_path, lines_with(lambda number, fields: ",".join([f"{start + number / RATE_HZ * per_s:.6f}", *fields[1:]]))
+    )
+    assert "write sample_rate_hz = ... under [test]" in message(path)
+    expect(read(path, "sample_rate_hz = 2048.0"))
+
+
 def test_stamps_of_too_few_digits_need_a_rate(tmp_path):
     coarse = stamped(lambda minutes, seconds: f"10:{51 + minutes}:{int(1e3 * seconds) / 1e3:06.3f}")
     path = write(tmp_path, coarse)

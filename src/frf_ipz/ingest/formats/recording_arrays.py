@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.errors import FileFormatError
+from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.ingest.formats.file_arrays import ArrayFormat, FileArrays, describe, last_part
 from frf_ipz.ingest.formats.registry import find_array_format
 from frf_ipz.ingest.formats.signal_table import Signal, SignalTable, describe_signals, even_times, open_signals
 from frf_ipz.ingest.formats.testlab_arrays import TestlabBlock, points_of, testlab_blocks
 from frf_ipz.ingest.formats.text_columns import TIME, TIME_UNIT
 from frf_ipz.ingest.formats.text_layout import read_head
+from frf_ipz.ingest.formats.time_stamps import resolution_of, unit_of_stamps
 from frf_ipz.ingest.units import unit_factor
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ def find_signals(arrays: FileArrays, keys: TableKeys, columns: Sequence[str]) ->
         for name, array in shapes.items()
         if n_samples in array.shape and array.size <= n_samples * MOST_COLUMNS
     ]
-    signals = [signal for candidate in candidates for signal in _columns(arrays, candidate)]
+    signals = [signal for candidate in candidates for signal in _columns(arrays, candidate, keys.sample_rate_hz)]
     time, note = (None, "") if keys.time_column else _find_time(arrays, signals, keys, columns)
     has_own = {signal.name for signal in signals if signal.time is not None}
     others = [
@@ -131,14 +132,18 @@ def find_signals(arrays: FileArrays, keys: TableKeys, columns: Sequence[str]) ->
         for signal in signals
         if signal is not time and not (time is None and has_own and signal.time is None and _grows(signal.values))
     ]
-    times = None
+    unit = ""
     if time is not None:
-        times = time.values * (unit_factor(time.unit, "time") if time.unit else 1.0)
+        with errors_of_file(arrays.path, where=f"'{time.name}'"):
+            unit = time.unit or unit_of_stamps(time.values, keys.sample_rate_hz)
+            unit_factor(unit or "s", "time")
     left_out = [f"'{name}' ({describe(shapes[name])})" for name in shapes if n_samples not in shapes[name].shape]
     names = ", ".join(f"'{signal.name}'" for signal in others)
     chosen = f"taken by their shape: {names}, {n_samples} samples each; {note}"
     chosen += f"; left out: {', '.join(left_out)}" if left_out else ""
-    timed = tuple(signal if times is None else replace(signal, time=times) for signal in others)
+    timed = tuple(
+        signal if time is None else replace(signal, time=time.values, time_unit=unit or "s") for signal in others
+    )
     return SignalTable(path=arrays.path, signals=timed, notes=(chosen,))
 
 
@@ -159,13 +164,15 @@ def _lengths(arrays: FileArrays, shapes: dict[str, NumericArray], columns: Seque
     return weights
 
 
-def _columns(arrays: FileArrays, candidate: _Candidate) -> Iterator[Signal]:
+def _columns(arrays: FileArrays, candidate: _Candidate, sample_rate_hz: float | None) -> Iterator[Signal]:
     """Give the columns of an array, with the names and units that stand beside it."""
     rows = np.moveaxis(candidate.values, candidate.axis, 0)
     columns = rows.reshape(candidate.n_samples, -1)
     n_columns = columns.shape[1]
     first = columns[:, 0].astype(np.float64) if n_columns > 1 else np.empty(0)
     own_time = first if n_columns > 1 and _grows(first) and not _counts(first) else None
+    with errors_of_file(arrays.path, where=f"'{candidate.name}'"):
+        own_unit = "" if own_time is None else unit_of_stamps(own_time, sample_rate_hz)
     units = _texts_beside(arrays, candidate.name, UNIT, n_columns)
     labels = _texts_beside(arrays, candidate.name, NAMES, n_columns) if n_columns > 1 else ()
     for number in range(n_columns):
@@ -181,6 +188,7 @@ def _columns(arrays: FileArrays, candidate: _Candidate) -> Iterator[Signal]:
             values=columns[:, number].astype(np.float64),
             unit=units[number].strip() if units else _unit_of_time(name),
             time=own_time if number else None,
+            time_unit=own_unit or "s",
             dof=dofs[0] if len(dofs) == 1 else None,
         )
 
@@ -264,7 +272,9 @@ def _find_rate(arrays: FileArrays, rate_variable: str) -> tuple[float | None, st
 def _grows(values: FloatArray) -> bool:
     steps = np.diff(values)
     median = float(np.median(steps)) if steps.size else 0.0
-    return median > 0.0 and bool((np.abs(steps - median) <= EVEN * median).all())
+    resolution = resolution_of(values)
+    tolerance = EVEN * median + (resolution if resolution < 0.5 * median else 0.0)
+    return median > 0.0 and bool((np.abs(steps - median) <= tolerance).all())
 
 
 def _counts(values: FloatArray) -> bool:
@@ -281,8 +291,9 @@ def _named_signal(arrays: FileArrays, column: str, table: SignalTable) -> Iterat
         example = arrays.column_name(column, (None, 0))
         problem = f"'{column}' is {describe(values)}; a channel is one column of real numbers, as in '{example}'"
         raise FileFormatError(arrays.path, f"{problem}; write it as 'column', or under 'variables'")
-    time = next((signal.time for signal in table.signals if len(signal.values) == len(values)), None)
-    yield Signal(name=column, values=values.astype(np.float64), unit=_unit_of_time(column), time=time)
+    alike = (signal for signal in table.signals if len(signal.values) == len(values))
+    time, unit = next(((signal.time, signal.time_unit) for signal in alike), (None, "s"))
+    yield Signal(name=column, values=values.astype(np.float64), unit=_unit_of_time(column), time=time, time_unit=unit)
 
 
 def _testlab_table(arrays: FileArrays, blocks: Sequence[TestlabBlock]) -> SignalTable:

@@ -11,7 +11,14 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats.recording import LARGEST, RawRecording, RecordingContents, SignalColumn
-from frf_ipz.ingest.formats.text_columns import TIME, find_columns, no_time, seconds_of_day, unwrap_days
+from frf_ipz.ingest.formats.text_columns import (
+    TIME,
+    find_columns,
+    no_time,
+    printed_resolution,
+    seconds_of_day,
+    unwrap_days,
+)
 from frf_ipz.ingest.formats.text_layout import is_number, name_and_unit, sniff
 from frf_ipz.ingest.formats.text_table import column_index, line_of_row, not_a_number, read_blocks
 from frf_ipz.ingest.units import unit_factor
@@ -91,7 +98,8 @@ def _by_rate(
         return
     unit = found.units[found.time]
     step_s = (last - first) / (n_rows - 1) * (unit_factor(unit, "time") if unit else 1.0)
-    if abs(step_s * sample_rate_hz - 1.0) > SAME_RATE:
+    rounded = 0.0 if found.holds_stamps else printed_resolution(layout, found.time) / (last - first)
+    if abs(step_s * sample_rate_hz - 1.0) > SAME_RATE + rounded * step_s * sample_rate_hz:
         problem = (
             f"[test] sample_rate_hz = {sample_rate_hz:g}, but its column '{found.names[found.time]}' has a mean step "
             f"of {step_s:.6g} s, which is {1.0 / step_s:.6g} Hz; correct sample_rate_hz, or leave it out"

@@ -11,8 +11,9 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.dofs import Dof
-from frf_ipz.errors import FileFormatError, did_you_mean
+from frf_ipz.errors import FileFormatError, did_you_mean, errors_of_file
 from frf_ipz.ingest.formats.recording import LARGEST, RawRecording, RecordingContents, SignalColumn, TableKeys
+from frf_ipz.ingest.formats.time_stamps import unit_of_stamps
 from frf_ipz.ingest.units import unit_factor
 
 SAME_RATE = 0.01  # the contract's limit for a step that differs
@@ -31,7 +32,9 @@ class Signal:
     unit : str
         What the file says; may be empty.
     time : (n_samples,) array, optional
-        When the samples were taken, s; None where the file does not say.
+        When the samples were taken; None where the file does not say.
+    time_unit : str
+        Of the time.
     dof : Dof, optional
         Where it was measured, if the file says so.
     """
@@ -40,6 +43,7 @@ class Signal:
     values: FloatArray
     unit: str = ""
     time: FloatArray | None = None
+    time_unit: str = "s"
     dof: Dof | None = None
 
 
@@ -310,7 +314,7 @@ def _find_time(table: SignalTable, chosen: Sequence[Signal], keys: TableKeys) ->
         _require_same_length(table, first, time)
         times, unit, name = time.values, time.unit, time.name
     elif first.time is not None:
-        times, unit, name = first.time, "s", "time"
+        times, unit, name = first.time, first.time_unit, "time"
         for signal in chosen:
             if signal.time is None or not _are_same_times(first.time, signal.time):
                 problem = f"'{first.name}' and '{signal.name}' were not sampled at the same times"
@@ -320,6 +324,8 @@ def _find_time(table: SignalTable, chosen: Sequence[Signal], keys: TableKeys) ->
     else:
         problem = "does not say when its samples were taken: write sample_rate_hz = ... under [test]"
         raise FileFormatError(table.path, f"{problem}, or name the time by time_column or variables = {{ time = ... }}")
+    with errors_of_file(table.path, where=f"'{name}'"):
+        unit = unit or unit_of_stamps(times, keys.sample_rate_hz)
     if keys.sample_rate_hz is None:
         return times, unit, name
     step_s = float(times[-1] - times[0]) / max(n_samples - 1, 1) * (unit_factor(unit, "time") if unit else 1.0)

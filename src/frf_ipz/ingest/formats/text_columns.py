@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.errors import FileFormatError
+from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.ingest.formats.text_layout import STAMP, is_number, is_stamp, name_and_unit
 from frf_ipz.ingest.formats.text_table import column_index
+from frf_ipz.ingest.formats.time_stamps import DAY_S, unit_of_stamps
 from frf_ipz.ingest.units import is_unit
 from frf_ipz.text_numbers import NumberError, parse_number
 
@@ -27,18 +28,17 @@ if TYPE_CHECKING:
 EVEN = 0.02  # of the step between printed times: twice what the contract allows, since digits are rounded
 LETTERS_SHOWN, NAMES_SHOWN = 40, 10  # of names of columns, in a message
 FEWEST_ROWS = 3  # two steps can be compared
-DAY_S = 86400.0
-YEAR_2000_S, YEAR_2100_S = 946684800.0, 4102444800.0  # since 1970
-EPOCH_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 TIME = re.compile(
     r"^(elapsed|relative|abs(olute)?)?[ _]*(t|time|zeit|temps|tempo|tiempo|tid|tijd|x[ _-]?value|x[ _-]?axis|"
     r"seconds?|secs?|timestamp|zeitstempel|date ?time|milliseconds?|microseconds?)(?![a-z])",
     re.IGNORECASE,
 )
 TIME_UNIT = re.compile(
-    r"(?:^|[ _/.,])(s|sec|secs|seconds?|ms|msec|milliseconds?|us|µs|microseconds?|ns|min)$", re.IGNORECASE
+    r"(?:^|[ _/.,])(s|sec|secs|seconds?|ms|msec|milliseconds?|us|µs|microseconds?|ns|min|h|hours?|d|days?)$",
+    re.IGNORECASE,
 )
 FREQUENCY = re.compile(r"freq|frequenz|\bhz\b", re.IGNORECASE)
+PRINTED = re.compile(r"[-+]?[0-9]*(?:[.,]([0-9]*))?(?:[eEdD]([-+]?[0-9]{1,3}))?")
 REMARK = re.compile(r"comments?|kommentare?|remarks?", re.IGNORECASE)
 
 
@@ -96,7 +96,9 @@ def find_columns(layout: TextLayout, keys: TableKeys, *, columns: Sequence[str] 
         time = _find_time(layout, names, units, taken, counts_samples=counts_samples)
     holds_stamps = time is not None and is_stamp(layout.rows[0][time])
     if time is not None:
-        units[time] = "s" if holds_stamps else units[time] or _unit_of_time(names[time]) or _unit_of_epoch(layout, time)
+        stated = "s" if holds_stamps else units[time] or _unit_of_time(names[time])
+        with errors_of_file(layout.path, where=f"column '{names[time]}'"):
+            units[time] = stated or unit_of_stamps(_column(layout, time), keys.sample_rate_hz)
     return TextColumns(
         names=tuple(names), units=tuple(units), time=time, counts_samples=counts_samples, holds_stamps=holds_stamps
     )
@@ -127,6 +129,26 @@ def no_time(layout: TextLayout, found: TextColumns) -> FileFormatError:
         f"where another one is the time: {shown}"
     )
     return FileFormatError(layout.path, problem, where=f"line {max(layout.n_before, 1)}")
+
+
+def printed_resolution(layout: TextLayout, index: int) -> float:
+    """Say how finely the numbers of a column are given.
+
+    Parameters
+    ----------
+    layout : TextLayout
+        How the file is laid out.
+    index : int
+        The column.
+
+    Returns
+    -------
+    float
+        The last digit that is printed, or the distance to the next double where that is larger.
+    """
+    printed = [PRINTED.fullmatch(fields[index].strip()) for fields in layout.rows if index < len(fields)]
+    last_digit = min((int(match[2] or 0) - len(match[1] or "") for match in printed if match), default=0)
+    return max(float(f"1e{last_digit}"), float(np.spacing(np.abs(_column(layout, index)).max(initial=0.0))))
 
 
 def seconds_of_day(stamps: Sequence[str]) -> FloatArray:
@@ -283,8 +305,7 @@ def _grows(layout: TextLayout, index: int) -> bool:
     if len(steps) < FEWEST_ROWS - 1 or not (steps > 0.0).all():
         return False
     median = float(np.median(steps))
-    digits = max((len(fields[index].replace(",", ".").partition(".")[2]) for fields in layout.rows), default=0)
-    equal = np.abs(steps - median) <= EVEN * median + 2.0 * 10.0**-digits
+    equal = np.abs(steps - median) <= EVEN * median + 2.0 * printed_resolution(layout, index)
     return 2 * int(equal.sum()) > len(equal)
 
 
@@ -301,12 +322,6 @@ def _column(layout: TextLayout, index: int) -> FloatArray:
 def _is_time_unit(unit: str) -> bool:
     """Tell a unit that may be of time from one that is of something else."""
     return not (is_unit(unit) and not TIME_UNIT.search(unit.strip()))
-
-
-def _unit_of_epoch(layout: TextLayout, index: int) -> str:
-    """Find the unit of times since 1970, which are dates of this century in one unit only."""
-    first = next(iter(_column(layout, index)), 0.0)
-    return next((unit for unit, factor in EPOCH_UNITS.items() if YEAR_2000_S <= first * factor < YEAR_2100_S), "")
 
 
 def _unit_of_time(name: str) -> str:
