@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from frf_ipz.errors import ShapeError
+from frf_ipz.errors import InputError, ShapeError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,6 +21,46 @@ BoolArray = npt.NDArray[np.bool_]
 Matrix: TypeAlias = "sparse.csr_array[np.float64, tuple[int, int]]"  # sparse, as the matrices of an FE model are
 
 Scalar = TypeVar("Scalar", bound=np.generic)
+LARGEST_WHOLE = 2**53  # above it doubles leave whole numbers out
+
+
+def as_whole_numbers(values: npt.ArrayLike, what: str) -> IntArray:
+    """Take numbers of a file as whole ones: places, counts and nodes, that a cast would cut or turn over.
+
+    Parameters
+    ----------
+    values : array
+        Integers, or floating-point numbers without a fraction.
+    what : str
+        What they are, for the message.
+
+    Returns
+    -------
+    array
+        The same numbers, as integers.
+
+    Raises
+    ------
+    InputError
+        If one is no whole number, or too large to be known exactly.
+
+    Examples
+    --------
+    >>> as_whole_numbers([1.0, 3.0], "the rows").tolist()
+    [1, 3]
+    >>> as_whole_numbers([1.0, 1.5], "the rows")
+    Traceback (most recent call last):
+    ...
+    frf_ipz.errors.InputError: the rows hold 1.5, which is no whole number that can be read
+    """
+    numbers = np.asarray(values)
+    if numbers.dtype.kind not in "iufb":
+        raise InputError(f"the array with {what} holds {numbers.dtype}; whole numbers are needed")
+    is_whole = (numbers >= -LARGEST_WHOLE) & (numbers <= LARGEST_WHOLE) & (numbers == np.rint(numbers))
+    if not is_whole.all():
+        wrong = numbers[~is_whole].ravel()[0]
+        raise InputError(f"{what} hold {wrong:.10g}, which is no whole number that can be read")
+    return numbers.astype(np.int64)
 
 
 def read_only(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:

@@ -2,6 +2,7 @@
 
 import re
 import tempfile
+import warnings
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -365,7 +366,9 @@ def parse(name, data):
         path = Path(folder) / name
         path.write_bytes(data)
         reader = PARSERS[name][1]
-        return load_manifest(Path(folder)) if reader is None else reader(path)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # a user would see it on the terminal
+            return load_manifest(Path(folder)) if reader is None else reader(path)
 
 
 def refusal_of(name, data):

@@ -11,7 +11,8 @@ from calculix_models import SHELL, SOLID, run_calculix
 from fe_models import beam, export
 from frf_ipz.errors import FileFormatError
 from frf_ipz.fe.eigen import solve_modes
-from frf_ipz.fe.matrices.registry import recognises
+from frf_ipz.fe.matrices.registry import read_matrix, recognises
+from frf_ipz.fe.matrices.stored import MatrixRequest
 from frf_ipz.fe.model_file import model_files, read_model
 
 ROUNDING = 1e-12
@@ -267,3 +268,51 @@ def test_frequencies_of_calculix_are_its_own(tmp_path, deck):
     assert_allclose(solve_modes(model, n_modes=8).natural_frequency_hz, expected, rtol=1e-6)
     if deck is SOLID:
         assert_allclose(np.ptp(model.geometry.coordinates_m, axis=0), [0.05, 0.01, 0.004])
+
+
+HARWELL_BOEING = """K of a chain
+             4             1             1             2             0
+RSA                        3             3             5             0
+(4I7)           (5I7)           (3E20.8)
+      1      3      5      6
+      1      2      2      3      3
+      2.00000000E+00     -1.00000000E+00      2.00000000E+00
+     -1.00000000E+00      1.00000000E+00
+"""
+
+
+@pytest.mark.parametrize("number", ["1.5", "1e300", "-1e300", "1e19"])
+@pytest.mark.parametrize("line", [4, 5])
+def test_places_of_harwell_boeing_are_whole_numbers(tmp_path, line, number):
+    lines = HARWELL_BOEING.split("\n")
+    lines[line] = lines[line].replace("      3", f"{number:>7}", 1)
+    path = tmp_path / "K.hb"
+    path.write_text("\n".join(lines))
+    with pytest.raises(FileFormatError, match=r"K\.hb: its (pointers|rows) hold .*no whole number"):
+        read_matrix(MatrixRequest(path=path, what="stiffness"))
+
+
+@pytest.mark.parametrize("text", ["1 1 2.0\n99999999999999999999 1 3.0\n", "1,1,1,1,2.0\n9007199254740995,1,1,1,3.0\n"])
+def test_rows_that_no_double_holds_are_refused(tmp_path, text):
+    path = tmp_path / "job.sti"
+    path.write_text(text)
+    with pytest.raises(FileFormatError, match=r"job\.sti: its rows and columns hold .*no whole number"):
+        read_matrix(MatrixRequest(path=path, what="stiffness"))
+
+
+@pytest.mark.parametrize("name", ["indices", "indptr", "shape"])
+@pytest.mark.parametrize("number", [0.5, 1e300, np.nan])
+def test_places_of_a_sparse_matrix_are_whole_numbers(tmp_path, name, number):
+    parts = {
+        "format": np.array("csr"),
+        "shape": np.array([2.0, 2.0]),
+        "data": np.array([2.0, 1.0]),
+        "indices": np.array([0.0, 1.0]),
+        "indptr": np.array([0.0, 1.0, 2.0]),
+    }
+    np.savez(tmp_path / "whole.npz", **parts)
+    assert read_matrix(MatrixRequest(path=tmp_path / "whole.npz", what="stiffness")).matrix.shape == (2, 2)
+    parts[name][1] = number
+    np.savez(tmp_path / "K.npz", **parts)
+    with pytest.raises(FileFormatError, match=r"K\.npz.* hold .*no whole number"):
+        read_matrix(MatrixRequest(path=tmp_path / "K.npz", what="stiffness"))

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
+from frf_ipz.arrays import as_whole_numbers
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof, parse_dof
-from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.errors import FileFormatError, InputError, errors_of_file
 from frf_ipz.fe.matrices.stored import MatrixRequest, StoredMatrix, as_matrix, both_triangles, positions_of_rows
 from frf_ipz.numerics.compressed_places import require_places
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from frf_ipz.arrays import Matrix
+    from frf_ipz.arrays import IntArray, Matrix
 
 ROWS = ("dofs", "dof", "labels")
 PLACES = ("coordinates", "coordinates_m", "coords", "xyz")
@@ -78,15 +79,20 @@ def _sparse_of_parts(parts: tuple[str, tuple[int, ...], Mapping[str, Any]], path
     if len(shape) != 2:
         raise FileFormatError(path, f"holds an array of the shape {shape}; a matrix is needed")
     if kind == "coo":
-        rows, columns = (np.asarray(arrays[name], np.int64) for name in ("row", "col"))
+        rows, columns = (_places_in(arrays, name, path) for name in ("row", "col"))
         matrix: Any = sparse.coo_array((arrays["data"], (rows, columns)), shape=shape)
     elif kind in COMPRESSED:
-        indices, pointers = (np.asarray(arrays[name], np.int64) for name in ("indices", "indptr"))
+        indices, pointers = (_places_in(arrays, name, path) for name in ("indices", "indptr"))
         matrix = COMPRESSED[kind]((arrays["data"], indices, pointers), shape=shape)
         require_places(matrix)
     else:
         raise FileFormatError(path, f"holds a sparse matrix in the format '{kind}'; save it as csr, csc or coo")
     return sparse.csr_array(matrix)
+
+
+def _places_in(arrays: Mapping[str, Any], name: str, path: Path) -> IntArray:
+    with errors_of_file(path, where=f"array '{name}'"):
+        return as_whole_numbers(arrays[name], "its places")
 
 
 def _dofs(labels: Any, path: Path) -> tuple[Dof, ...]:  # noqa: ANN401 - an array of texts, or of numbers

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
-from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.arrays import as_whole_numbers
+from frf_ipz.errors import FileFormatError, InputError, errors_of_file
 from frf_ipz.fe.matrices.stored import MatrixFormat, MatrixRequest, StoredMatrix, as_matrix, both_triangles
 from frf_ipz.input_files import read_bytes
 from frf_ipz.text_numbers import parse_number
@@ -54,7 +55,8 @@ def _read(request: MatrixRequest) -> StoredMatrix:
     pointers = cells.take(start, counts[1], formats[0], n_columns + 1)
     rows = cells.take(start + counts[1], counts[2], formats[1], n_entries)
     values = cells.take(start + counts[1] + counts[2], counts[3], formats[2], n_entries)
-    places = (pointers.astype(np.int64) - 1, rows.astype(np.int64) - 1)
+    with errors_of_file(path):
+        places = (as_whole_numbers(pointers, "its pointers") - 1, as_whole_numbers(rows, "its rows") - 1)
     is_ordered = places[0][0] == 0 and places[0][-1] == n_entries and (np.diff(places[0]) >= 0).all()
     if not is_ordered or (n_entries and not 0 <= places[1].min() <= places[1].max() < n_rows):
         raise FileFormatError(path, "has rows or columns outside the matrix; export it again")

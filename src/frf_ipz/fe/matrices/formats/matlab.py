@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from scipy import sparse
 
+from frf_ipz.arrays import as_whole_numbers
+from frf_ipz.errors import errors_of_file
 from frf_ipz.fe.matrices.matlab_7_3_process import COLUMNS, DATA, N_ROWS, ROWS
 from frf_ipz.fe.matrices.named_arrays import read_named
 from frf_ipz.fe.matrices.stored import MOST_BYTES, MatrixFormat, MatrixRequest, StoredMatrix
@@ -69,13 +70,18 @@ def _arrays_of_hdf5(path: Path) -> dict[str, Any]:
     arrays = read_in_process(path, PROCESS, kind=KIND, most_bytes=MOST_BYTES).arrays
     found = {name: values for name, values in arrays.items() if "/" not in name}
     for name in (way.removesuffix(ROWS) for way in arrays if way.endswith(ROWS)):
-        found[name] = _sparse(*(arrays[name + part] for part in (DATA, ROWS, COLUMNS, N_ROWS)))
+        with errors_of_file(path):
+            found[name] = _sparse(*(arrays[name + part] for part in (DATA, ROWS, COLUMNS, N_ROWS)))
     return found
 
 
 def _sparse(values: Any, rows: Any, columns: Any, n_rows: Any) -> Any:  # noqa: ANN401 - arrays of any numbers
     """Assemble a sparse matrix, whose places are checked first: SciPy trusts them."""
     shape = (int(n_rows), len(columns) - 1)
-    matrix: Any = sparse.csc_array((values, np.asarray(rows, np.int64), np.asarray(columns, np.int64)), shape=shape)
+    places = (
+        as_whole_numbers(rows, "rows of a sparse matrix"),
+        as_whole_numbers(columns, "columns of a sparse matrix"),
+    )
+    matrix: Any = sparse.csc_array((values, *places), shape=shape)
     require_places(matrix)
     return sparse.csr_array(matrix)

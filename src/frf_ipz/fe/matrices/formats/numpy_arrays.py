@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frf_ipz.errors import FileFormatError
+from frf_ipz.arrays import as_whole_numbers
+from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.fe.matrices.named_arrays import read_named
 from frf_ipz.fe.matrices.stored import MOST_BYTES, MatrixFormat, MatrixRequest, StoredMatrix
 from frf_ipz.foreign_errors import errors_of_reader
@@ -30,7 +31,7 @@ def _read(request: MatrixRequest) -> StoredMatrix:
     found = read_numpy(request.path, only=ONLY, most_bytes=MOST_BYTES)
     for name in found.pickled:
         raise FileFormatError(request.path, f"holds pickled objects in '{name}', which are not read; save numbers")
-    with errors_of_reader(request.path, KIND):
+    with errors_of_reader(request.path, KIND), errors_of_file(request.path):
         return read_named(_assembled(found.arrays), request)
 
 
@@ -43,4 +44,4 @@ def _assembled(arrays: dict[str, Any]) -> dict[str, Any]:
         return arrays
     kind = np.asarray(arrays["format"]).item()
     kind = kind.decode() if isinstance(kind, bytes) else str(kind)
-    return {ONLY: (kind, tuple(int(size) for size in arrays["shape"]), arrays)}
+    return {ONLY: (kind, tuple(as_whole_numbers(arrays["shape"], "the sizes of the matrix").ravel().tolist()), arrays)}

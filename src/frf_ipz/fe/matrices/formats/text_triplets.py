@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
+from frf_ipz.arrays import as_whole_numbers
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
-from frf_ipz.errors import FileFormatError, InputError
+from frf_ipz.errors import FileFormatError, InputError, errors_of_file
 from frf_ipz.fe.matrices.stored import (
     MatrixFormat,
     MatrixRequest,
@@ -61,7 +62,8 @@ def _read(request: MatrixRequest) -> StoredMatrix:
     data = read_bytes(path)
     text = COMMENT.sub(b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") + b"\n")
     entries = _columns(path, text)
-    places, values = entries[:, :-1].astype(np.int64), entries[:, -1]
+    with errors_of_file(path):
+        places, values = as_whole_numbers(entries[:, :-1], "its rows and columns"), entries[:, -1]
     if not len(values):
         raise FileFormatError(path, "holds no entry of a matrix; export it again")
     if places.shape[1] == 2:
