@@ -256,7 +256,8 @@ class UniformTimeCheck:
         tolerance = UNIFORM * abs(self._median) + (self._resolution if can_tell else 0.0)
         wrong = ~(np.abs(steps - self._median) <= tolerance) | (steps <= 0.0)
         if wrong.any():
-            coarse = f"its times are rounded to {self._resolution:.2g} s, and " if not can_tell else ""
+            is_coarse = self._median > 0.0 and not can_tell
+            coarse = f"its times are rounded to {self._resolution:.2g} s, and " if is_coarse else ""
             position = int(np.argmax(wrong))
             row = self._n_rows + position + (self._n_rows == 0)
             raise FileFormatError(

@@ -453,3 +453,60 @@ def test_a_line_above_0_hz_that_is_not_finite_is_refused(tmp_path):
     rows = [",".join([*row.split(",")[:3], "nan", "0"]) if row.startswith("0.5,") else row for row in lines_of(file)]
     file.write_text("\n".join(rows) + "\n", encoding="utf-8")
     assert re.search("line 3, column 'real': holds 'nan'", message(tmp_path, entry()))
+
+
+STATED = {"output_dof": "1:+z", "input_dof": "1:+z"}
+
+
+POLAR = np.abs(VALUES[:, 0]), np.angle(VALUES[:, 0])
+
+
+def analyser_text(folder, names, *columns):
+    text = np.column_stack([LINES_HZ, *columns])
+    header = "\t".join(["Frequency [Hz]", *names])
+    np.savetxt(folder / "frf.txt", text, fmt="%.16e", delimiter="\t", header=header, comments="", encoding="utf-8")
+
+
+def parts(scale=1.0, values=VALUES[:, 0]):
+    return values.real * scale, values.imag * scale
+
+
+@pytest.mark.parametrize(
+    ("names", "columns", "says"),
+    [
+        (
+            ("Magnitude", "Phase"),
+            POLAR,
+            "degrees or radians; write columns = ",
+        ),
+        (("Magnitude", "Phase [grad]"), POLAR, "'Phase .grad.' is neither in"),
+        (("Magnitude", "Phase [mrad]"), POLAR, "'Phase .mrad.' is neither in"),
+        (("Magnitude", "Phase [deg]"), (-np.abs(VALUES[:, 0]), 50.0 * np.angle(VALUES[:, 0])), "negative magnitudes"),
+        (("Real [mm/N]", "Imag [mm/N]"), parts(), "'mm/N', which is receptance; correct the 'quantity'"),
+        (("Real [N/(m/s^2)]", "Imag [N/(m/s^2)]"), parts(), r"'N/\(m/s\^2\)', which is force over response; correct"),
+    ],
+    ids=["no unit of phases", "grad", "mrad", "negative", "receptance", "force over response"],
+)
+def test_what_the_header_of_an_analyser_cannot_mean_is_refused(tmp_path, names, columns, says):
+    analyser_text(tmp_path, names, *columns)
+    text = message(tmp_path, entry("frf.txt", **STATED))
+    assert re.search(rf"frf\.txt: .*{says}", text), text
+
+
+def test_units_with_brackets_within_are_read(tmp_path):
+    analyser_text(tmp_path, ("Real [(mm/s^2)/(N)]", "Imag [(mm/s^2)/(N)]"), *parts(1e3))
+    frfs = read(tmp_path, entry("frf.txt", **STATED)).frfs
+    np.testing.assert_allclose(frfs.values[:, 0], VALUES[:, 0], rtol=DIGITS)
+
+
+def test_units_of_force_over_response_are_read(tmp_path):
+    analyser_text(tmp_path, ("Real [kN/(m/s^2)]", "Imag [kN/(m/s^2)]"), *parts(1e-3, 1.0 / (VALUES[:, 0] + 1.0)))
+    frfs = read(tmp_path, entry("frf.txt", quantity="apparent_mass", **STATED)).frfs
+    np.testing.assert_allclose(frfs.values[:, 0], VALUES[:, 0] + 1.0, rtol=1e-12)
+
+
+def test_a_unit_that_is_not_the_headers_is_said(tmp_path):
+    analyser_text(tmp_path, ("Real [g/N]", "Imag [g/N]"), *parts())
+    result = read(tmp_path, entry("frf.txt", unit="m/s^2/N", **STATED))
+    np.testing.assert_allclose(result.frfs.values[:, 0], VALUES[:, 0], rtol=DIGITS)
+    assert any("in 'm/s^2/N', as its [[frf]] says, where its header says 'g/N'" in text for text in result.warnings)

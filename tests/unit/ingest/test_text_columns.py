@@ -355,3 +355,13 @@ def test_what_reads_in_a_thread_has_let_go_of_the_file_before_it_goes_on(tmp_pat
     layout = sniff(path)
     assert not list(text_table.read_blocks(layout, ["time", "force"], {0: pa.float64()}))
     assert [reference() for reference in held] == [None]
+
+
+def test_a_time_without_a_unit_that_counts_by_one_counts_samples(tmp_path):
+    """As seconds, these were a rate of 1 Hz."""
+    counts = lines_with(lambda number, fields: ",".join([str(number), *fields[1:]]))
+    path = write(tmp_path, counts)
+    assert "the first column 'time' counts the samples; write sample_rate_hz = ... under [test]" in message(path)
+    expect(read(path, "sample_rate_hz = 2048.0"))
+    in_ms = write(tmp_path, lambda text: named("time [ms]")(counts(text)))
+    np.testing.assert_allclose(np.diff(read(in_ms)[:, 0]), 1e-3, rtol=1e-9)

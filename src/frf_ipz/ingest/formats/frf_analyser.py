@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.ingest.formats import frf_text
@@ -17,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
+    from frf_ipz.arrays import ComplexArray
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
 ROLES = (  # of a column, by its name; the first that fits
@@ -24,7 +28,7 @@ ROLES = (  # of a column, by its name; the first that fits
     ("coherence", re.compile(r"coh|gamma", re.IGNORECASE)),
     ("imag", re.compile(r"imag|^im\b", re.IGNORECASE)),
     ("real", re.compile(r"real|^re\b", re.IGNORECASE)),
-    ("phase_rad", re.compile(r"pha.*rad", re.IGNORECASE)),
+    ("phase_rad", re.compile(r"(pha|angle).*(?<![a-z])rad", re.IGNORECASE)),
     ("phase_deg", re.compile(r"pha|angle", re.IGNORECASE)),
     ("magnitude_db", re.compile(r"(mag|amp|abs|mod).*db|^db", re.IGNORECASE)),
     ("magnitude", re.compile(r"mag|amp|abs|modul", re.IGNORECASE)),
@@ -32,6 +36,8 @@ ROLES = (  # of a column, by its name; the first that fits
 MAGNITUDES = {"magnitude", "magnitude_db"}
 PHASES = {"real", "imag", "phase_deg", "phase_rad"}
 LABELS = ("output_dof", "input_dof")
+DEGREES = re.compile(r"deg|°|º", re.IGNORECASE)
+LEAST_SPAN = 2.0 * np.pi  # degrees: within it phases without a unit may be radians
 RATIO = re.compile(r"\(([^()]+)\)\s*\(([^()]+)\)")  # SignalCalc writes (m/s²)(N) for a ratio
 MOST_HEAD = 1 << 12  # bytes in which a binary file shows itself
 
@@ -47,12 +53,18 @@ class AnalyserColumns:
     unit : str
         Of the values; may be empty.
     quantity : FrfQuantity, optional
-        What has that unit.
+        What has that unit, or its reciprocal.
+    is_reciprocal : bool
+        It is a unit of force over response.
+    phase : str
+        The name of the column of phases where it states neither degrees nor radians.
     """
 
     columns: tuple[str, ...]
     unit: str = ""
     quantity: FrfQuantity | None = None
+    is_reciprocal: bool = False
+    phase: str = ""
 
 
 class _AnalyserText:
@@ -70,10 +82,20 @@ class _AnalyserText:
             raise FileFormatError(
                 source.path, "does not say what its columns are; write columns = [...] in its [[frf]]"
             )
-        is_known = found.quantity is source.quantity and not source.is_reciprocal
-        unit = found.unit if is_known else ""
+        is_meant = found.quantity is source.quantity and found.is_reciprocal == source.is_reciprocal
+        if found.unit and not is_meant and not source.unit:
+            what = "force over response" if found.is_reciprocal or found.quantity is None else found.quantity.value
+            problem = (
+                f"its header gives values in '{found.unit}', which is {what}; correct the 'quantity' of its [[frf]]"
+            )
+            raise FileFormatError(source.path, f"{problem}, or write their right 'unit' there")
         frfs = frf_text.FORMAT.read(replace(source, columns=found.columns))
+        if found.phase:
+            _require_degrees(source.path, found, frfs[0].values)
         about = f"{source.path.name}: its columns are {', '.join(found.columns)}"
+        if found.unit and source.unit and found.unit != source.unit:
+            about += f"; in '{source.unit}', as its [[frf]] says, where its header says '{found.unit}'"
+        unit = found.unit if is_meant else ""
         return tuple(replace(frf, source=source, unit=unit, notes=(*frf.notes, about)) for frf in frfs)
 
     def look(self, source: FrfSource) -> FrfContents:
@@ -84,7 +106,8 @@ class _AnalyserText:
                 source.path, "does not say what its columns are; write columns = [...] in its [[frf]]"
             )
         about = f"columns {', '.join(found.columns)}"
-        return FrfContents(n_outputs=1, n_inputs=1, quantity=found.quantity, unit=found.unit, about=about)
+        quantity = None if found.is_reciprocal else found.quantity
+        return FrfContents(n_outputs=1, n_inputs=1, quantity=quantity, unit=found.unit, about=about)
 
 
 FORMAT = _AnalyserText()
@@ -121,9 +144,18 @@ def find_frf_columns(source: FrfSource) -> AnalyserColumns | None:
             and roles[0] == frf_text.STATED
             and len(set(named)) == len(named)
         ):
-            unit, quantity = _unit_of(layout, words)
+            unit, quantity, is_reciprocal = _unit_of(layout, words)
+            phase = next((word for word in words if _role(word) == "phase_deg" and not DEGREES.search(word)), "")
+            if phase and any(map(DEGREES.search, (field for row in layout.header for field in row))):
+                phase = ""  # a row of units says it
             frequency = frf_text.name_of_frequency(frf_text.stated_frequency_unit(layout, 0))
-            return AnalyserColumns(columns=(frequency, *roles[1:]), unit=unit, quantity=quantity)
+            return AnalyserColumns(
+                columns=(frequency, *roles[1:]),
+                unit=unit,
+                quantity=quantity,
+                is_reciprocal=is_reciprocal,
+                phase=phase,
+            )
     return None
 
 
@@ -168,16 +200,31 @@ def _role(word: str) -> str:
     return next((role for role, pattern in ROLES if pattern.search(word)), "")
 
 
-def _unit_of(layout: TextLayout, words: Sequence[str]) -> tuple[str, FrfQuantity | None]:
-    """Find the text of the header that is a unit of FRFs, and of which."""
+def _require_degrees(path: Path, found: AnalyserColumns, values: ComplexArray) -> None:
+    """Refuse phases in a unit that is none of them, and such without a unit that look like radians."""
+    if name_and_unit(found.phase)[1]:
+        problem = f"its column '{found.phase}' is neither in degrees nor in radians; export one of them"
+        raise FileFormatError(path, problem)
+    phase_deg = np.degrees(np.angle(values))
+    if np.abs(phase_deg).max(initial=0.0) <= LEAST_SPAN and phase_deg.any():
+        columns = ", ".join(f'"{name}"' for name in found.columns)
+        problem = (
+            f"the phases of its column '{found.phase}' lie between {phase_deg.min():.3g} and {phase_deg.max():.3g}"
+        )
+        way_out = f"write columns = [{columns}] in its [[frf]], or phase_rad there"
+        raise FileFormatError(path, f"{problem}, and nothing says whether these are degrees or radians; {way_out}")
+
+
+def _unit_of(layout: TextLayout, words: Sequence[str]) -> tuple[str, FrfQuantity | None, bool]:
+    """Find the text of the header that is a unit of FRFs or of their reciprocals, and of which."""
     fields = [field for row in layout.header for field in row]
     for text in (*(name_and_unit(word)[1] for word in words), *fields):
         ratio = RATIO.fullmatch(text.strip())
         for unit in (text, f"({ratio[1]})/({ratio[2]})") if ratio else (text,):
-            for quantity in FrfQuantity if unit.strip() else ():
+            for quantity, is_reciprocal in product(FrfQuantity if unit.strip() else (), (False, True)):
                 try:
-                    frf_factor(unit, quantity, "z", "z")
+                    frf_factor(f"1/({unit})" if is_reciprocal else unit, quantity, "z", "z")
                 except QuantityError:
                     continue
-                return unit, quantity
-    return "", None
+                return unit, quantity, is_reciprocal
+    return "", None, False

@@ -50,6 +50,9 @@ class _TextColumns:
         columns = _read_columns(source)
         if source.output_dof is None or source.input_dof is None:
             raise FileFormatError(source.path, "holds one FRF: its [[frf]] needs 'output_dof' and 'input_dof'")
+        if (columns.get("magnitude", np.zeros(0)) < 0.0).any():
+            problem = "holds negative magnitudes; where they are decibels, name the column magnitude_db in 'columns'"
+            raise FileFormatError(source.path, problem)
         left_out = undefined_at_rest(columns)
         columns = {name: values[~left_out] for name, values in columns.items()}
         order = np.argsort(columns["frequency_hz"], kind="stable")

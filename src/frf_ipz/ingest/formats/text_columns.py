@@ -124,6 +124,8 @@ def no_time(layout: TextLayout, found: TextColumns) -> FileFormatError:
     shown = ", ".join([*listed[:NAMES_SHOWN], *(["..."] if len(listed) > NAMES_SHOWN else [])])
     first = f"the first column '{first_name}'" if first_name else "the first column"
     behaves = "counts the samples" if found.counts_samples else "does not grow by equal steps"
+    if not _is_time_unit(found.units[0]):
+        behaves = f"is in '{found.units[0]}'"
     problem = (
         f"has no column 'time', and {first} {behaves}; write sample_rate_hz = ... under [test], or time_column = ... "
         f"where another one is the time: {shown}"
@@ -290,8 +292,8 @@ def _find_time(
 
 
 def _counts_samples(layout: TextLayout, names: Sequence[str], units: Sequence[str], index: int) -> bool:
-    """Tell a column of 0, 1, 2, ... whose name does not say that these are seconds."""
-    if TIME.match(names[index]) or units[index]:
+    """Tell a column of 0, 1, 2, ... where nothing says that these are seconds; 'time' alone does not."""
+    if units[index] or _unit_of_time(names[index]):
         return False
     values = _column(layout, index)
     return len(values) > 1 and bool((np.diff(values) == 1.0).all()) and bool((values == np.rint(values)).all())

@@ -30,7 +30,7 @@ DELIMITERS = (";", "\t", ",", " ")  # in the order they are tried; the blank sta
 NEWLINE = re.compile(rb"\r\n|\n|\r")
 TWO_NUMBERS = re.compile(r"\d\s+[+-]?[\d.]")
 DECIMAL_COMMA = re.compile(r"^[+-]?\d*,\d+([eEdD][+-]?\d+)?$")
-NAME_AND_UNIT = re.compile(r"^(?P<name>.+?)\s*[\[(](?P<unit>[^\])]*)[\])]$")
+OPENING = {"]": "[", ")": "("}
 CLOCK = r"(?:(?P<hours>\d{1,2}):)?(?P<minutes>\d{1,2}):(?P<seconds>\d{1,2})(?:[.,:](?P<fraction>\d+))?"
 DATE = r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}"
 STAMP = re.compile(rf"(?:{DATE}[T ,]\s*)?{CLOCK}\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?:Z|UTC|[+-]\d\d:?\d\d)?")
@@ -299,11 +299,19 @@ def name_and_unit(text: str) -> tuple[str, str]:
 
     Examples
     --------
-    >>> name_and_unit("force [N]")
-    ('force', 'N')
+    >>> name_and_unit("force [N]"), name_and_unit("Real [(m/s^2)/N]")
+    (('force', 'N'), ('Real', '(m/s^2)/N'))
     """
-    match = NAME_AND_UNIT.match(text)
-    return (match["name"], match["unit"].strip()) if match else (text, "")
+    closing = text[-1:]
+    if closing not in OPENING:
+        return text, ""
+    depth = 0
+    for place in range(len(text) - 1, 0, -1):
+        depth += (text[place] == closing) - (text[place] == OPENING[closing])
+        if depth == 0:
+            name = text[:place].rstrip()
+            return (name, text[place + 1 : -1].strip()) if name else (text, "")
+    return text, ""
 
 
 def _check_text(path: Path, head: bytes) -> None:
