@@ -38,6 +38,7 @@ USUAL = {  # the factors that pint gives
     "displacement": {"m": 1.0},
     "time": {"s": 1.0},
 }
+LARGEST_FACTOR = 1e100  # of a number that is written into a unit: squares of it may overflow
 MOTIONS = ("acceleration", "velocity", "displacement")
 UNREADABLE = (  # beside pint's own
     ArithmeticError,
@@ -180,7 +181,7 @@ def sensitivity_factor(sensitivity: str, quantity: str, *, rotational: bool = Fa
     Raises
     ------
     QuantityError
-        If it cannot be read, is zero, or measures something else.
+        If it cannot be read, is zero or absurdly large, or measures something else.
 
     Examples
     --------
@@ -434,6 +435,7 @@ def _convert(value: pint.Quantity[float], si: str, problem: str, quantity: str) 
         if quantity and value.is_compatible_with("V"):
             instead = f', or what the sensor gives, as in sensitivity = "10 mV/{f"({si})" if "/" in si else si}"'
         raise QuantityError(f"{problem}; expected is {hint}{instead}") from None
-    if not math.isfinite(factor) or factor == 0.0:
-        raise QuantityError(f"{problem}: it is {factor:g} {si}; write a unit, without a number that is zero or NaN")
+    if not 1.0 / LARGEST_FACTOR < abs(factor) < LARGEST_FACTOR:  # NaN is neither
+        advice = "write a unit, without a number that is zero, NaN or absurdly large or small"
+        raise QuantityError(f"{problem}: it is {factor:g} {si}; {advice}")
     return factor

@@ -155,6 +155,8 @@ def test_units_of_frfs(unit, quantity, directions, factor):
         (lambda: unit_factor("m/", "force"), "no unit that can be read"),
         (lambda: sensitivity_factor("10 mV", "force"), "is no ratio of units"),
         (lambda: sensitivity_factor("0 mV/N", "force"), "is zero"),
+        (lambda: sensitivity_factor("1e300 mV/N", "force"), "zero, NaN or absurdly large"),
+        (lambda: unit_factor("1e-300 N", "force"), "zero, NaN or absurdly large"),
         (lambda: sensitivity_factor("10 mV/m", "force"), "is not per unit of force"),
         (lambda: frf_factor("m/N", FrfQuantity.ACCELERANCE, "z", "z"), "'m/N' is no unit of accelerance"),
     ],
