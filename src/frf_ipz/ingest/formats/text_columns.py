@@ -296,7 +296,9 @@ def _counts_samples(layout: TextLayout, names: Sequence[str], units: Sequence[st
     if units[index] or _unit_of_time(names[index]):
         return False
     values = _column(layout, index)
-    return len(values) > 1 and bool((np.diff(values) == 1.0).all()) and bool((values == np.rint(values)).all())
+    return (
+        len(values) >= FEWEST_ROWS and bool((np.diff(values) == 1.0).all()) and bool((values == np.rint(values)).all())
+    )
 
 
 def _grows(layout: TextLayout, index: int) -> bool:
