@@ -17,6 +17,7 @@ from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.dofs import AnyDof, as_dof, as_dofs
 from frf_ipz.errors import InputError, ShapeError
 from frf_ipz.quantities import FrfQuantity, as_quantity
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -239,7 +240,8 @@ class FrfSet(Tabulated, Drawn):
         low, high = self.band_hz
         ends = f"{', '.join(map(str, self.output_dofs))} / {', '.join(map(str, self.input_dofs))}"
         kinds = ", ".join(dict.fromkeys(label.quantity.value for label in self.labels))
-        return f"FrfSet: {self.n_frfs} FRFs ({kinds}) on {self.n_lines} lines from {low:g} to {high:g} Hz, {ends}"
+        n_frfs, n_lines = counted(self.n_frfs, "FRF"), counted(self.n_lines, "line")
+        return f"FrfSet: {n_frfs} ({kinds}) on {n_lines} from {low:g} to {high:g} Hz, {ends}"
 
     @classmethod
     def from_arrays(

@@ -24,6 +24,7 @@ from frf_ipz.numerics.constraints import AdmissibleMotions
 from frf_ipz.numerics.neighbours import lines_between_neighbours
 from frf_ipz.numerics.structural_matrices import MatrixOptions, ModelMatrices
 from frf_ipz.unit_systems import SI, UnitSystem
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -276,7 +277,7 @@ class StructuralModel(Drawn):
             raise InputError(f"the model '{self.name}' names a DOF twice")
         for name in ("mass_all", "stiffness_all", "damping_all"):
             if getattr(self, name).shape != (n_all, n_all):
-                raise InputError(f"{name} is {getattr(self, name).shape}, but the model has {n_all} DOFs")
+                raise InputError(f"{name} is {getattr(self, name).shape}, but the model has {counted(n_all, 'DOF')}")
         require_shape("the marks of held DOFs", self.fixed, (n_all,))
         self._check_ports()
 
@@ -721,7 +722,7 @@ class ReducedModel:
 
     def __repr__(self) -> str:
         dofs = ", ".join(map(str, self.dofs[:DOFS_SHOWN])) + (", ..." if len(self.dofs) > DOFS_SHOWN else "")
-        return f"ReducedModel: {len(self.dofs)} DOFs ({dofs}), {self.n_modes} modes in its basis"
+        return f"ReducedModel: {counted(len(self.dofs), 'DOF')} ({dofs}), {counted(self.n_modes, 'mode')} in its basis"
 
     def __post_init__(self) -> None:
         order = len(self.dofs)

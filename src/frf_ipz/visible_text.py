@@ -85,3 +85,26 @@ def _shown(letter: str) -> str:
     if letter in JOINERS or unicodedata.category(letter) not in OBEYED:
         return letter
     return letter.encode("unicode_escape").decode("ascii")
+
+
+def counted(count: int, noun: str, plural: str = "") -> str:
+    """Write how many there are.
+
+    Parameters
+    ----------
+    count : int
+        How many.
+    noun, plural : str
+        What; the plural ends in s where it is not given.
+
+    Returns
+    -------
+    str
+        The count, and the noun in its number.
+
+    Examples
+    --------
+    >>> counted(1, "pole"), counted(2, "pole"), counted(2, "entry", "entries")
+    ('1 pole', '2 poles', '2 entries')
+    """
+    return f"{count} {noun if count == 1 else plural or noun + 's'}"

@@ -132,7 +132,7 @@ def write_frfs(frfs: FrfSet, path: str | Path) -> None:
     >>> with TemporaryDirectory() as folder:
     ...     frf_ipz.write_frfs(frfs, Path(folder) / "frf.unv")
     ...     frf_ipz.read_frfs(Path(folder) / "frf.unv")
-    FrfSet: 1 FRFs (accelerance) on 3 lines from 1 to 3 Hz, 2:-x / 1:+x
+    FrfSet: 1 FRF (accelerance) on 3 lines from 1 to 3 Hz, 2:-x / 1:+x
     """
     require_type("frfs", frfs, FrfSet)
     target = _require_format(as_path(path), FRF_FORMATS)

@@ -11,8 +11,9 @@ from frf_ipz.fleet.page import write_sections
 from frf_ipz.plotting.curves import Q95, magnitude_title
 from frf_ipz.plotting.frfs import PHASE_AXIS, magnitude_and_phase, magnitude_hover
 from frf_ipz.plotting.picture import Axis, Layer, Line, Panel, Picture, Points, Role, frequency_axis
-from frf_ipz.plotting.wording import NOTHING, counted, number, with_error
+from frf_ipz.plotting.wording import NOTHING, number, with_error
 from frf_ipz.report.section import Block, Card, Cards, Choice, Figure, Headline, Section, Table
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

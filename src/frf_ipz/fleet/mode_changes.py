@@ -24,8 +24,9 @@ from frf_ipz.fleet.outliers import FALSE_ALARMS
 from frf_ipz.identification.options import Stability
 from frf_ipz.late_imports import import_late
 from frf_ipz.modes import modal_assurance
-from frf_ipz.plotting.wording import NOTHING, counted, number, with_error
+from frf_ipz.plotting.wording import NOTHING, number, with_error
 from frf_ipz.runs.results import Results
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -174,7 +175,7 @@ class RunComparison(Concise):
         if len(self.common) == 1:
             return f"The mode at {number(moved[0].before_hz)} Hz has moved by {changes[0]:+.1f} %: {self.direction}."
         verb = "has" if len(moved) == 1 else "have"
-        return f"{len(moved)} of {len(self.common)} modes {verb} moved, by {by}: {self.direction}."
+        return f"{len(moved)} of {counted(len(self.common), 'mode')} {verb} moved, by {by}: {self.direction}."
 
     @property
     def direction(self) -> str:

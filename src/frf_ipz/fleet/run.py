@@ -31,6 +31,7 @@ from frf_ipz.runs.folder_lock import lock_folder
 from frf_ipz.runs.generations import HIDDEN
 from frf_ipz.runs.results import open_results
 from frf_ipz.toml_files import to_options
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -198,7 +199,7 @@ class _Work:
 
 def _how_far(records: dict[str, MachineRecord], total: int) -> str:
     failed = sum(record.status == FAILED for record in records.values())
-    return f"{len(records)} of {total} machines" + (f", {failed} failed" if failed else "")
+    return f"{len(records)} of {counted(total, 'machine')}" + (f", {failed} failed" if failed else "")
 
 
 def _as_it_stands(machine: Machine, out: Path) -> MachineRecord:

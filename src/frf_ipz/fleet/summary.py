@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.fleet.fleet_file import MODEL
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,4 +62,6 @@ def _spread(mode: str, frequency_hz: pd.Series) -> str:
     mean, count = float(frequency_hz.mean()), len(frequency_hz)
     if count == 1:
         return f"mode {mode}: {mean:.5g} Hz in one machine"
-    return f"mode {mode}: {mean:.5g} Hz +-{100 * float(frequency_hz.std()) / mean:.2g} % over {count} machines"
+    return (
+        f"mode {mode}: {mean:.5g} Hz +-{100 * float(frequency_hz.std()) / mean:.2g} % over {counted(count, 'machine')}"
+    )

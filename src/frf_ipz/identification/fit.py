@@ -56,6 +56,7 @@ from frf_ipz.modes import ModalParameters
 from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.progress import Progress, silent
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -309,7 +310,7 @@ def _warnings(
     texts = []
     alone = of_one_impact(frfs)
     if alone.any() and not fitted.poles_are_held:
-        which = "every FRF" if alone.all() else f"{alone.sum()} of {len(alone)} FRFs"
+        which = "every FRF" if alone.all() else f"{alone.sum()} of {counted(len(alone), 'FRF')}"
         texts.append(
             f"one impact stands behind {which}: how the next would differ is not seen, so that the fit counts on "
             f"{100 * ONE_IMPACT:.0f} % of the FRF, in common over the width of a peak; three impacts or more show it"

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from frf_ipz.arrays import BoolArray, FloatArray, require_shape
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.errors import ShapeError
@@ -16,6 +14,7 @@ from frf_ipz.identification.root_covariance import RootCovariance
 from frf_ipz.late_imports import import_late
 from frf_ipz.modes import ModalParameters
 from frf_ipz.rational import PoleResidueModel, ZeroSet, natural_frequency_hz
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -134,9 +133,10 @@ class ModalFit(Tabulated, Drawn):
         values = [f"{hertz:.2f}" for hertz in natural_frequency_hz(self.model.poles[: self.n_modes])]
         listed = ", ".join(values[:MODES_SHOWN]) + (", ..." if len(values) > MODES_SHOWN else "")
         if self.modes_given is not None:
-            return f"ModalFit: {self.n_modes} modes at {listed} Hz, identified elsewhere"
-        zeros = f"{np.count_nonzero(self.zeros.identifiable)} zeros of {len(self.labels)} FRFs"
-        return f"ModalFit: {self.n_modes} modes at {listed} Hz, {zeros}" if values else f"ModalFit: no modes, {zeros}"
+            return f"ModalFit: {counted(self.n_modes, 'mode')} at {listed} Hz, identified elsewhere"
+        zeros = f"{counted(int(self.zeros.identifiable.sum()), 'zero')} of {counted(len(self.labels), 'FRF')}"
+        modes = f"{counted(self.n_modes, 'mode')} at {listed} Hz" if values else "no modes"
+        return f"ModalFit: {modes}, {zeros}"
 
     def __post_init__(self) -> None:
         size = 2 * (self.n_modes + len(self.zeros.values))

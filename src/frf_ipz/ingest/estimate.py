@@ -69,7 +69,7 @@ def estimate_frfs(
     ...     )
     >>> test = frf_ipz.VibrationTest.from_recordings(recordings)
     >>> frf_ipz.estimate_frfs(test)
-    FrfEstimate: 3 of 3 records; FrfSet: 1 FRFs (accelerance) on 2001 lines from 0 to 1000 Hz, 1:+z / 1:+z
+    FrfEstimate: 3 of 3 records; FrfSet: 1 FRF (accelerance) on 2001 lines from 0 to 1000 Hz, 1:+z / 1:+z
     """
     require_type("test", test, VibrationTest)
     require_type("options", options, IngestOptions, optional=True)

@@ -10,6 +10,7 @@ from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.frf import FrfSet
 from frf_ipz.late_imports import import_late
 from frf_ipz.modes import ModalParameters
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -101,7 +102,10 @@ class FrfEstimate(Tabulated, Drawn):
 
     def __repr__(self) -> str:
         if self.modes is not None:
-            return f"FrfEstimate: no FRF; {len(self.modes.damping_ratio)} modes at {len(self.modes.dofs)} DOFs"
+            n_modes, n_dofs = len(self.modes.damping_ratio), len(self.modes.dofs)
+            return f"FrfEstimate: no FRF; {counted(n_modes, 'mode')} at {counted(n_dofs, 'DOF')}"
         used = int(self.records["used"].sum()) if len(self.records) else 0
-        of_records = f"{used} of {len(self.records)} records" if len(self.records) else "FRFs estimated elsewhere"
+        of_records = (
+            f"{used} of {counted(len(self.records), 'record')}" if len(self.records) else "FRFs estimated elsewhere"
+        )
         return f"FrfEstimate: {of_records}; {self.frfs!r}"

@@ -20,7 +20,8 @@ from frf_ipz.plotting.picture import (
     in_hover,
 )
 from frf_ipz.plotting.structure import CHARACTER
-from frf_ipz.plotting.wording import counted, listed, number
+from frf_ipz.plotting.wording import listed, number
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray

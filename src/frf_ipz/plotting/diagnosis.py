@@ -8,7 +8,8 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.plotting.picture import Axis, Bars, HeatMap, Layer, Line, Panel, Picture, Points, Role, frequency_axis
-from frf_ipz.plotting.wording import counted, number, percent
+from frf_ipz.plotting.wording import number, percent
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.result import Curves, Diagnosis, Finding, Misfit

@@ -20,7 +20,8 @@ from frf_ipz.plotting.picture import (
     frequency_axis,
     in_hover,
 )
-from frf_ipz.plotting.wording import counted, number
+from frf_ipz.plotting.wording import number
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray, FloatArray

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.plotting.picture import Axis, HeatMap, Panel, Picture, Role
-from frf_ipz.plotting.wording import counted, number
+from frf_ipz.plotting.wording import number
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,7 +47,7 @@ def describe_mac(agreements: Sequence[ShapeAgreement]) -> Picture | None:
             )
             for agreement in agreements
         ),
-        note=f"1: the same shape, 0: nothing in common. Compared at {n_dofs} DOFs"
+        note=f"1: the same shape, 0: nothing in common. Compared at {counted(n_dofs, 'DOF')}"
         + (", fewer than there are modes: shapes of different modes can look alike there." if few else "."),
         height_px=int(np.clip(150 + 34 * n_measured, 240, 760)),
         has_legend=False,

@@ -10,7 +10,8 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.plotting.curves import Q95, dash_of, magnitude_title
 from frf_ipz.plotting.frfs import magnitude_hover
 from frf_ipz.plotting.picture import Axis, Layer, Line, Panel, Picture, Role, frequency_axis, in_hover
-from frf_ipz.plotting.wording import counted, number, percent
+from frf_ipz.plotting.wording import number, percent
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -23,9 +23,10 @@ from frf_ipz.plotting.picture import (
     frequency_axis,
     joined_segments,
 )
-from frf_ipz.plotting.wording import counted, listed, number
+from frf_ipz.plotting.wording import listed, number
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 from frf_ipz.updating.targets import root_name
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

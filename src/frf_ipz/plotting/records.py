@@ -8,7 +8,7 @@ import numpy as np
 
 from frf_ipz.plotting.curves import dash_of
 from frf_ipz.plotting.picture import Axis, Line, Panel, Picture, in_hover
-from frf_ipz.plotting.wording import counted
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,6 +12,7 @@ from frf_ipz.dofs import PortDof, node_dofs
 from frf_ipz.plotting.picture import Axis, Colour, Labels, Layer, Line, Panel, Picture, Points, Role, joined_segments
 from frf_ipz.plotting.projection import project
 from frf_ipz.plotting.wording import listed, number
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -371,7 +372,7 @@ def _in_words(geometry: Geometry | None, marks: StructureMarks) -> str:
     parts = ["Drawing of the structure"]
     if geometry is not None:
         extent = " by ".join(f"{number(value, 3)} m" for value in np.ptp(geometry.coordinates_m, axis=0) if value > 0)
-        parts.append(f"{len(geometry.nodes)} nodes over {extent}")
+        parts.append(f"{counted(len(geometry.nodes), 'node')} over {extent}")
         parts += [f"node {node} {how}" for node, how in list(geometry.supports.items())[:4]]
     for name, dofs in (("sensors", marks.sensors), ("inputs", marks.inputs), ("points of interest", marks.points)):
         parts += [f"{name} at {listed([str(dof) for dof in dofs])}"] if dofs else []

@@ -11,7 +11,8 @@ from frf_ipz.arrays import FloatArray, IntArray
 from frf_ipz.dofs import Dof
 from frf_ipz.plotting.picture import Axis, Band, Bars, Layer, Line, Panel, Picture, Points, Role
 from frf_ipz.plotting.projection import project
-from frf_ipz.plotting.wording import counted, number, percent
+from frf_ipz.plotting.wording import number, percent
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

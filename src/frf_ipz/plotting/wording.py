@@ -118,24 +118,6 @@ def with_error(value: float, std: float, digits: int = 6) -> str:
     return f"{rounded:.{decimals}f} ± {std:.{decimals}f}"
 
 
-def counted(count: int, noun: str, plural: str = "") -> str:
-    """Write how many there are.
-
-    Parameters
-    ----------
-    count : int
-        How many.
-    noun, plural : str
-        What; the plural ends in s where it is not given.
-
-    Returns
-    -------
-    str
-        For example ``1 pole`` or ``2 poles``.
-    """
-    return f"{count} {noun if count == 1 else plural or noun + 's'}"
-
-
 def listed(items: Sequence[str], n_listed: int = 6) -> str:
     """Join a few items into a phrase.
 

@@ -10,6 +10,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray, require_shape
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.frf import FrfLabel
 from frf_ipz.rational import ZeroSet
+from frf_ipz.visible_text import counted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -72,7 +73,7 @@ class Prediction(Tabulated, Drawn):
     relative: tuple[int, ...] = ()
 
     def __repr__(self) -> str:
-        lines = f"{len(self.frequency_hz)} lines"
+        lines = f"{counted(len(self.frequency_hz), 'line')}"
         if len(self.frequency_hz):
             lines += f" from {self.frequency_hz[0]:g} to {self.frequency_hz[-1]:g} Hz"
         return f"Prediction: {', '.join(map(str, self.labels))} on {lines}"

@@ -20,6 +20,7 @@ from frf_ipz.numerics.closed_faces import faces_between_lines
 from frf_ipz.numerics.pencils import damped_poles
 from frf_ipz.rational import natural_frequency_hz
 from frf_ipz.structure import Mesh
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -253,7 +254,7 @@ def _scaled_onto(motion: Motion, measured: Motion, hertz: float) -> Motion:
     title = f"{motion.name}, {hertz:.5g} Hz"
     if len(shared) > 1:
         mac = float(modal_assurance(mine[:, None], theirs[:, None])[0, 0])
-        title += f", MAC {mac:.3f} at {len(shared)} DOFs"
+        title += f", MAC {mac:.3f} at {counted(len(shared), 'DOF')}"
     return Motion(name=motion.name, title=title, dofs=motion.dofs, values=motion.values * factor)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from frf_ipz.rational import natural_frequency_hz
 from frf_ipz.runs.figures import coherence_text, deviation_of
-from frf_ipz.visible_text import one_line, written_out
+from frf_ipz.visible_text import counted, one_line, written_out
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -178,12 +178,15 @@ def estimate_lines(estimate: FrfEstimate, *, coherence: str = "") -> list[tuple[
     """
     records, frfs = estimate.records, estimate.frfs
     if estimate.modes is not None:
-        return [("measured", f"modes at {len(estimate.modes.dofs)} DOFs, no FRF"), *_notes(estimate.warnings)]
+        return [
+            ("measured", f"modes at {counted(len(estimate.modes.dofs), 'DOF')}, no FRF"),
+            *_notes(estimate.warnings),
+        ]
     lines = []
     if len(records):
         used = int(records["used"].astype(bool).sum())
-        lines.append(("recordings", f"{len(records)} records, {used} used"))
-    span = f"{frfs.n_frfs} FRFs, {frfs.frequency_hz[0]:g} to {frfs.frequency_hz[-1]:g} Hz"
+        lines.append(("recordings", f"{counted(len(records), 'record')}, {used} used"))
+    span = f"{counted(frfs.n_frfs, 'FRF')}, {frfs.frequency_hz[0]:g} to {frfs.frequency_hz[-1]:g} Hz"
     span += f", coherence {coherence}" if coherence else ""
     return [*lines, ("FRFs", span), *_notes(estimate.warnings)]
 
@@ -208,8 +211,8 @@ def fit_lines(fit: ModalFit) -> list[tuple[str, str]]:
     if fit.modes_given is not None:
         return [("modes", f"{fit.n_modes} identified elsewhere: {values}{rest} Hz"), *_notes(fit.warnings)]
     return [
-        ("fit", f"{fit.n_modes} modes: {values}{rest} Hz"),
-        ("", f"{zeros} zeros with a number, {len(fit.zeros.values) - zeros} not identifiable"),
+        ("fit", f"{counted(fit.n_modes, 'mode')}: {values}{rest} Hz"),
+        ("", f"{counted(zeros, 'zero')} with a number, {len(fit.zeros.values) - zeros} not identifiable"),
         *_notes(fit.warnings),
     ]
 
@@ -253,7 +256,7 @@ def reduced_lines(reduced: ReducedModel) -> list[tuple[str, str]]:
     dofs = " ".join(dof.name for dof in reduced.dofs)
     listed = f"dofs: {', '.join(dof.name for dof in reduced.dofs)}"  # what the first line says
     choices = [text for text in reduced.choices if text != listed]
-    return [("model", f"reduced to {len(reduced.dofs)} DOFs: {dofs}"), *[("", text) for text in choices]]
+    return [("model", f"reduced to {counted(len(reduced.dofs), 'DOF')}: {dofs}"), *[("", text) for text in choices]]
 
 
 def pairs_lines(pairs: Pairs) -> list[tuple[str, str]]:

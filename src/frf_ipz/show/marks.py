@@ -10,8 +10,8 @@ import numpy as np
 from frf_ipz.dofs import node_dofs
 from frf_ipz.plotting.picture import Layer, Panel, Picture, Points, Role, Span, VerticalLines, with_layers
 from frf_ipz.plotting.projection import project
-from frf_ipz.plotting.wording import counted
 from frf_ipz.rational import natural_frequency_hz
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 from frf_ipz.errors import InputError
 from frf_ipz.plotting.structure import StructureMarks, describe_structure
-from frf_ipz.plotting.wording import counted, listed
+from frf_ipz.plotting.wording import listed
 from frf_ipz.report.section import Block, Figure, Section, Table
 from frf_ipz.runs.memory import RunMemory
 from frf_ipz.runs.results import Results
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -30,6 +30,7 @@ from frf_ipz.frf import FrfLabel
 from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.pencils import modes_of_stack
 from frf_ipz.pairing.poles import AMPLITUDE_STD, measured_amplitudes
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from scipy.optimize import brentq, linear_sum_assignment
@@ -100,7 +101,7 @@ class MeasuredScale:
     believes: BoolArray = field(default_factory=lambda: np.zeros(0, bool))
 
     def __repr__(self) -> str:
-        return f"MeasuredScale: {self.kind}, {len(self.labels)} FRFs, {len(self.draws)} draws"
+        return f"MeasuredScale: {self.kind}, {counted(len(self.labels), 'FRF')}, {len(self.draws)} draws"
 
     @property
     def is_relative(self) -> bool:

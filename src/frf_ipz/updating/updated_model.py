@@ -18,6 +18,7 @@ from frf_ipz.pairing.pairs import Pairs
 from frf_ipz.structure import ReducedModel
 from frf_ipz.updating.expansion import ShapeExpansion
 from frf_ipz.updating.scale import MeasuredScale
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -139,7 +140,7 @@ class UpdatedModel(Tabulated, Drawn):
 
     def __repr__(self) -> str:
         counts = f"{len(self.after)} targets, {len(self.history)} iterations"
-        return f"UpdatedModel: {self.method}, {self.status.value}, {counts}, {len(self.model.dofs)} DOFs"
+        return f"UpdatedModel: {self.method}, {self.status.value}, {counts}, {counted(len(self.model.dofs), 'DOF')}"
 
     def compute_frfs(self, labels: tuple[FrfLabel, ...], s: ComplexArray, *, nominal: bool = False) -> ComplexArray:
         """Compute FRFs in the unit of the measurement: those of the model times the gains over it.

@@ -286,7 +286,7 @@ def test_text_below_the_numbers_is_left_out(tmp_path, footer):
 
 def test_text_among_the_numbers_is_refused(tmp_path):
     path = write(tmp_path, lambda text: text + "pause\n" + text.partition("\n")[2])
-    assert re.search(r"line 25[89]: has 1 values where the table has 4 columns", message(path))
+    assert re.search(r"line 25[89]: has 1 value where the table has 4 columns", message(path))
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from frf_ipz.plotting.wording import counted, listed, number, percent, small_percent, with_error
+from frf_ipz.plotting.wording import listed, number, percent, small_percent, with_error
+from frf_ipz.visible_text import counted
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from frf_ipz.assessment.assessment import Check, Verdict
 from frf_ipz.identification.results.shapes import mode_shapes
 from frf_ipz.modes import modal_assurance
 from frf_ipz.pairing.model_roots import model_shapes
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from frf_ipz.assessment.evidence import Evidence
@@ -81,7 +82,7 @@ def agreement(evidence: Evidence) -> Iterator[Check]:
         limit=SAME_SHAPE,
         unit="MAC",
         where=f"{hertz:.4g} Hz",
-        says=f"MAC between measured and updated shapes at {len(measured.dofs)} DOFs is {value:.2f} at worst "
+        says=f"MAC between measured and updated shapes at {counted(len(measured.dofs), 'DOF')} is {value:.2f} at worst "
         f"({hertz:.4g} Hz, {len(targets)} paired modes)",
         advice=""
         if value >= SAME_SHAPE

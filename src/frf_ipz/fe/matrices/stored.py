@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.errors import FileFormatError
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -253,5 +254,5 @@ def _require_order(matrix: Matrix, order: int, path: Path, ordered_by: str) -> N
     rows, columns = matrix.shape
     if rows != order:
         raise FileFormatError(
-            path, f"is {rows} x {columns}, but {ordered_by} names {order} DOFs; one row a DOF is needed"
+            path, f"is {rows} x {columns}, but {ordered_by} names {counted(order, 'DOF')}; one row a DOF is needed"
         )

@@ -196,7 +196,7 @@ def read_frfs(
     >>> with TemporaryDirectory() as folder:
     ...     _ = (Path(folder) / "tip.csv").write_text(table)
     ...     frf_ipz.read_frfs(f"{folder}/tip.csv", quantity="accelerance")
-    FrfSet: 1 FRFs (accelerance) on 2 lines from 10 to 20 Hz, 11:+z / 6:+z
+    FrfSet: 1 FRF (accelerance) on 2 lines from 10 to 20 Hz, 11:+z / 6:+z
     """
     source = FrfSource(
         path=require_file(path),

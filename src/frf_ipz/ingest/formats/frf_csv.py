@@ -13,6 +13,7 @@ from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf,
 from frf_ipz.ingest.formats.text_layout import TextLayout, sniff
 from frf_ipz.ingest.formats.text_table import column_index, not_a_number, read_blocks, require_once
 from frf_ipz.late_imports import import_late
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -61,7 +62,7 @@ FORMAT = _LongCsv()
 
 def _read_table(layout: TextLayout, names: tuple[str, ...]) -> pa.Table:
     if len(names) != layout.n_columns:
-        problem = f"has {layout.n_columns} values where the header has {len(names)} columns"
+        problem = f"has {counted(layout.n_columns, 'value')} where the header has {counted(len(names), 'column')}"
         raise FileFormatError(layout.path, problem, where=f"line {layout.n_before + 1}")
     numeric = [*NUMBERS, *(name for name in OPTIONAL if name in names)]
     columns = {column_index(layout, names, name): name for name in (*numeric, *LABELS)}

@@ -14,6 +14,7 @@ from frf_ipz.ingest.formats.text_layout import COMMENT, NEWLINE, TextLayout, dec
 from frf_ipz.ingest.formats.text_table import not_a_number, read_blocks, require_once
 from frf_ipz.ingest.units import frequency_factor, is_frequency_unit
 from frf_ipz.late_imports import import_late
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -97,7 +98,7 @@ def _check_columns(source: FrfSource) -> None:
 def _read_columns(source: FrfSource) -> dict[str, FloatArray]:
     layout = sniff(source.path, skip_rows=source.skip_rows)
     if layout.n_columns < len(source.columns):
-        problem = f"has {layout.n_columns} columns, but 'columns' of its [[frf]] names {len(source.columns)}"
+        problem = f"has {counted(layout.n_columns, 'column')}, but 'columns' of its [[frf]] names {len(source.columns)}"
         raise FileFormatError(source.path, problem, where=f"line {layout.n_before + 1}")
     names = [*source.columns, *[SKIP] * (layout.n_columns - len(source.columns))]
     indices = [index for index, name in enumerate(names) if name != SKIP]

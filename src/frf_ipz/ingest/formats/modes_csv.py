@@ -13,6 +13,7 @@ from frf_ipz.ingest.formats.text_layout import sniff
 from frf_ipz.ingest.formats.text_table import column_index, line_of_row, read_blocks
 from frf_ipz.late_imports import import_late
 from frf_ipz.modes import DEVIATIONS
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -69,7 +70,7 @@ FORMAT = _ModesCsv()
 
 def _read_columns(layout: TextLayout, names: tuple[str, ...]) -> dict[str, np.ndarray]:
     if len(names) != layout.n_columns:
-        problem = f"has {layout.n_columns} values where the header has {len(names)} columns"
+        problem = f"has {counted(layout.n_columns, 'value')} where the header has {counted(len(names), 'column')}"
         raise FileFormatError(layout.path, problem, where=f"line {layout.n_before + 1}")
     present = [*NEEDED, *(name for name in COLUMNS if name in names and name not in NEEDED)]
     indices = {column_index(layout, names, name): name for name in present}

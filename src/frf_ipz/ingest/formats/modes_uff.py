@@ -19,6 +19,7 @@ from frf_ipz.ingest.formats.modes_file import ModesSource, make_modes
 from frf_ipz.input_files import open_input
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 from frf_ipz.universal_sets import DataSet, is_universal, read_data_sets
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -121,7 +122,7 @@ def _read_shape(data: DataSet) -> _Shape:
     if analysis not in (NORMAL_MODE, *COMPLEX_MODES) or not (is_complex or data_type in REAL):
         raise data.fault(f"the analysis of type {analysis} with data of type {data_type} is no mode that is read", at)
     if not 1 <= n_values <= len(DIRECTIONS):
-        raise data.fault(f"{n_values} values a node; a node has 1 to 6", at)
+        raise data.fault(f"{counted(n_values, 'value')} a node; a node has 1 to 6", at)
     n_numbers = n_values * (2 if is_complex else 1)
     if data.kind == RESULTS:
         frequency_hz, ratio = _read_result_pole(data, at + 3, analysis)

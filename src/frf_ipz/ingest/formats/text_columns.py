@@ -17,6 +17,7 @@ from frf_ipz.ingest.formats.text_table import column_index
 from frf_ipz.ingest.formats.time_stamps import DAY_S, unit_of_stamps
 from frf_ipz.ingest.units import is_unit
 from frf_ipz.text_numbers import NumberError, parse_number
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -272,7 +273,7 @@ def _match_width(layout: TextLayout, fields: Sequence[str]) -> list[str] | None:
 
 
 def _wrong_width(layout: TextLayout, fields: Sequence[str]) -> FileFormatError:
-    problem = f"has {layout.n_columns} values where the header has {len(fields)} columns"
+    problem = f"has {counted(layout.n_columns, 'value')} where the header has {counted(len(fields), 'column')}"
     hint = "; a decimal comma needs semicolons or tabs between the columns" if layout.delimiter == "," else ""
     hint += "; where another line names the columns, write header_row = ... under [test]"
     return FileFormatError(layout.path, problem + hint, where=f"line {layout.n_before + 1}")

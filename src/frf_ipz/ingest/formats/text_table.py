@@ -14,6 +14,7 @@ from frf_ipz.errors import FileFormatError, did_you_mean
 from frf_ipz.ingest.formats.text_layout import NEWLINE, decode, is_number, name_and_unit, open_text
 from frf_ipz.late_imports import import_late
 from frf_ipz.text_numbers import NumberError, parse_number
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -247,12 +248,14 @@ def _bad_length(layout: TextLayout, number: int, length: int, expected: int, *, 
     if is_last and length < expected:
         return FileFormatError(
             layout.path,
-            f"the last line has {length} of {expected} values: the file is cut off; copy or export it again",
+            f"the last line has {length} of {counted(expected, 'value')}: the file is cut off; copy or export it again",
             where=where,
         )
     hint = "; a decimal comma needs semicolons or tabs between the columns" if layout.delimiter == "," else ""
     return FileFormatError(
-        layout.path, f"has {length} values where the table has {expected} columns{hint}", where=where
+        layout.path,
+        f"has {counted(length, 'value')} where the table has {counted(expected, 'column')}{hint}",
+        where=where,
     )
 
 

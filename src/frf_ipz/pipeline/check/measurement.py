@@ -16,7 +16,8 @@ from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.survey.selection import record_name
 from frf_ipz.pipeline.check.look import Look
 from frf_ipz.pipeline.check.text_table import text_table
-from frf_ipz.plotting.wording import counted, number
+from frf_ipz.plotting.wording import number
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -199,7 +200,7 @@ def _left_out(setup: TestSetup, records: pd.DataFrame) -> Iterator[str]:
     n_left_out = int((~records["used"]).sum())
     if 2 * n_left_out > len(records):
         marks = _describe_marks(records)
-        yield f"{n_left_out} of the {len(records)} records at {setup.input_dof} are left out: {marks}"
+        yield f"{n_left_out} of the {counted(len(records), 'record')} at {setup.input_dof} are left out: {marks}"
 
 
 def _beyond_the_hammer(

@@ -10,7 +10,8 @@ from frf_ipz.errors import NumericalError
 from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.global_motions import AXES, rigid_body_motions
 from frf_ipz.pipeline.check.look import Look
-from frf_ipz.plotting.wording import counted, number
+from frf_ipz.plotting.wording import number
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from frf_ipz.structure import StructuralModel

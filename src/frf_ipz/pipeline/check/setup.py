@@ -12,8 +12,7 @@ from frf_ipz.pipeline.check.measurement import look_at_measurement, open_recordi
 from frf_ipz.pipeline.check.model import look_at_model
 from frf_ipz.pipeline.check.open_marks import look_for_marks
 from frf_ipz.pipeline.check.sketch import draw
-from frf_ipz.plotting.wording import counted
-from frf_ipz.visible_text import one_line
+from frf_ipz.visible_text import counted, one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.plotting.wording import counted, number, percent
+from frf_ipz.plotting.wording import number, percent
 from frf_ipz.report.section import Section, Table, run_figures
 from frf_ipz.runs.figures import median_coherence
 from frf_ipz.runs.picture_data import fitted_lines
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import IntArray

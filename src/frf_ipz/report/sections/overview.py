@@ -9,12 +9,12 @@ import numpy as np
 from frf_ipz.assessment.assessment import Verdict
 from frf_ipz.assessment.checks.agreement import ALL_FRFS, TOGETHER
 from frf_ipz.assessment.deviations import POINTS
-from frf_ipz.plotting.wording import counted, listed, number, percent, small_percent
+from frf_ipz.plotting.wording import listed, number, percent, small_percent
 from frf_ipz.report.findings import card_texts, verdict_of
 from frf_ipz.report.section import Card, Cards, Headline, Section, Table, run_figures
 from frf_ipz.runs.figures import coherence_text, deviation_of
 from frf_ipz.runs.picture_data import update_targets
-from frf_ipz.visible_text import written_out
+from frf_ipz.visible_text import counted, written_out
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

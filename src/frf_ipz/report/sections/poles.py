@@ -8,9 +8,10 @@ import numpy as np
 
 from frf_ipz.arrays import IntArray
 from frf_ipz.plotting.ellipses import root_covariances, root_deviations
-from frf_ipz.plotting.wording import counted, number, with_error
+from frf_ipz.plotting.wording import number, with_error
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 from frf_ipz.report.section import Block, Section, Table, run_figures
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from frf_ipz.identification.modal_fit import ModalFit

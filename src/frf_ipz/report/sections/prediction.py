@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.plotting.wording import counted, listed, number
+from frf_ipz.plotting.wording import listed, number
 from frf_ipz.prediction.agreement import compare_frfs
 from frf_ipz.prediction.reference import measured_at
 from frf_ipz.report.section import Block, Choice, Section, Table, run_figures
 from frf_ipz.runs.figures import deviation_of
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from frf_ipz.plotting.wording import counted, number, percent
+from frf_ipz.plotting.wording import number, percent
 from frf_ipz.report.section import Section, Table, run_figures
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable

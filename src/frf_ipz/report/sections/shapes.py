@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from frf_ipz.plotting.wording import counted, number
+from frf_ipz.plotting.wording import number
 from frf_ipz.report.section import Form, Section
 from frf_ipz.runs.shapes import draw_shape, draw_structure, mode_shapes
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from frf_ipz.runs.results import Results

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frf_ipz.plotting.wording import counted, number, percent
+from frf_ipz.plotting.wording import number, percent
 from frf_ipz.report.section import Block, Section, Table, run_figures
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     import pandas as pd

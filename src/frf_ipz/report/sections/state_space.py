@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.plotting.wording import counted, number
+from frf_ipz.plotting.wording import number
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 from frf_ipz.report.section import Section, Table
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

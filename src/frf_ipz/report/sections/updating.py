@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.plotting.wording import counted, number, percent, small_percent
+from frf_ipz.plotting.wording import number, percent, small_percent
 from frf_ipz.report.section import Section, Table, run_figures
 from frf_ipz.runs.picture_data import changed_parts, update_targets
 from frf_ipz.updating.along_structure import notable_changes
 from frf_ipz.updating.targets import Target
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

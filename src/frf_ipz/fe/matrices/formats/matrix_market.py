@@ -24,6 +24,7 @@ from frf_ipz.input_files import MISSING, read_bytes
 from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.definiteness import SYMMETRY_TOLERANCE
 from frf_ipz.text_numbers import NumberError, parse_number
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -317,7 +318,7 @@ def _assemble(
     matrix: Matrix = sparse.csr_array(entries)
     notes = []
     if matrix.nnz < len(values):
-        notes.append(f"{text.path.name}: {len(values) - matrix.nnz} entries stand there again, and are added up")
+        notes.append(f"{text.path.name}: {counted(len(values) - matrix.nnz, 'entry', 'entries')} given again, added up")
     if text.format == "array":  # which has a number in every place
         matrix.eliminate_zeros()
     if text.symmetry == "skew-symmetric" and matrix.nnz:
