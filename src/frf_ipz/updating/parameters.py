@@ -195,9 +195,7 @@ class ParameterBasis(Concise):
             damping=self.damping[stays],
             stiffness=self.stiffness[stays],
             logarithmic=self.logarithmic[stays],
-            terms=tuple(
-                replace(term, root=term.root[:, term.root.any(axis=0)]) for term in terms if term.root.any()
-            ),
+            terms=tuple(replace(term, root=term.root[:, term.root.any(axis=0)]) for term in terms if term.root.any()),
             attached=tuple(int(numbers[place]) for place in self.attached if stays[place]),
         )
 
