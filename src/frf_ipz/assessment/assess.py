@@ -42,6 +42,7 @@ CHECKS: tuple[Ask, ...] = (
     quality.fit,
     quality.impacts,
     quality.scale,
+    quality.level,
     quality.diagnosis,
 )
 WITHOUT_FRFS: tuple[Ask, ...] = (

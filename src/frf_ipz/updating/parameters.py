@@ -110,6 +110,8 @@ class ParameterBasis(Concise):
     is_from_diagnosis : bool
         True where a diagnosis has named these parameters; only then do methods with generic parameters of their own
         use them instead.
+    attached : tuple of int
+        Parameters that are masses of what is attached to the structure: none is less than nothing.
 
     Raises
     ------
@@ -145,6 +147,7 @@ class ParameterBasis(Concise):
     terms: tuple[PriorTerm, ...]
     regions: tuple[Region, ...] = ()
     is_from_diagnosis: bool = False
+    attached: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -168,6 +171,33 @@ class ParameterBasis(Concise):
             Factors on the matrices.
         """
         return np.where(self.logarithmic, np.expm1(np.where(self.logarithmic, theta, 0.0)), theta)
+
+    def without_attached(self, places: Sequence[int]) -> ParameterBasis:
+        """Leave out masses of what is attached: it weighs nothing.
+
+        Parameters
+        ----------
+        places : sequence of int
+            Which parameters, of `attached`.
+
+        Returns
+        -------
+        ParameterBasis
+            Without them.
+        """
+        stays = ~np.isin(np.arange(len(self.names)), places)
+        numbers = np.cumsum(stays) - 1
+        terms = [replace(term, root=term.root[stays]) for term in self.terms]
+        return replace(
+            self,
+            names=tuple(name for name, is_kept in zip(self.names, stays, strict=True) if is_kept),
+            mass=self.mass[stays],
+            damping=self.damping[stays],
+            stiffness=self.stiffness[stays],
+            logarithmic=self.logarithmic[stays],
+            terms=tuple(replace(term, root=term.root[:, term.root.any(axis=0)]) for term in terms if term.root.any()),
+            attached=tuple(int(numbers[place]) for place in self.attached if stays[place]),
+        )
 
     def slopes(self, theta: FloatArray) -> FloatArray:
         """Give the derivative of `amounts`.
@@ -316,6 +346,7 @@ def join_bases(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:
         terms=tuple(terms),
         regions=first.regions,
         is_from_diagnosis=first.is_from_diagnosis or second.is_from_diagnosis,
+        attached=(*first.attached, *(n_first + place for place in second.attached)),
     )
 
 
@@ -361,6 +392,7 @@ def _sensor_basis(model: ReducedModel, sensors: Sequence[AnyDof]) -> ParameterBa
         stiffness=np.zeros_like(mass),
         logarithmic=np.zeros(len(dofs), bool),
         terms=(PriorTerm(name="mass of sensors", root=np.eye(len(dofs)), std=SENSOR_KG),),
+        attached=tuple(range(len(dofs))),
     )
 
 

@@ -264,6 +264,11 @@ class MeasuredScale:
         return float(DECIBEL * np.std(np.log(drawn)))
 
     @property
+    def level_std(self) -> float:
+        """Standard deviation of the logarithm of `level`; 0 where nothing tells it."""
+        return float(np.std(self.draws)) if self.draws.size and not self.is_relative else 0.0
+
+    @property
     def statement(self) -> str:
         """What is known of the scale, for people; empty where the test knows it."""
         if not self.is_relative:

@@ -270,6 +270,20 @@ def relative_run(evidence, kind, factors):
     return replace(evidence, frfs=frfs, fit=fit, updated_model=updated, prediction=predicted)
 
 
+@pytest.mark.parametrize(("factor", "called"), [(1 / 1.12, "12 % heavier"), (1.12, "11 % lighter")])
+def test_a_mass_that_is_in_doubt_is_said(evidence, factor, called):
+    scale = replace(evidence.updated_model.scale, level=factor)
+    check = the(quality.level, replace(evidence, updated_model=replace(evidence.updated_model, scale=scale)))
+    assert check.verdict is WITH_CARE
+    assert called in check.says
+
+
+def test_a_mass_that_is_as_good_as_others_is_not_in_doubt(evidence):
+    assert list(quality.level(evidence)) == []
+    scale = replace(evidence.updated_model.scale, level=1.04)
+    assert list(quality.level(replace(evidence, updated_model=replace(evidence.updated_model, scale=scale)))) == []
+
+
 @pytest.fixture(scope="module")
 def per_channel(evidence):
     return relative_run(evidence, "per_channel", [1.0, -7.0, 3.0])

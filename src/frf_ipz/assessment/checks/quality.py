@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.assessment.assessment import Check, Verdict
+from frf_ipz.assessment.checks.agreement import NORMAL_90
 from frf_ipz.control_margins import GAIN_MARGIN_DB, SIXTH
+from frf_ipz.updating.parameters import MASS_STD
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.assessment.evidence import Evidence
 
 WORST_MISFIT = 10.0  # times the noise: stated deviations of poles and zeros then mean nothing
+NO_CHANCE = 3.0  # standard deviations: once in 370 runs
 PLAUSIBLE_RATIO = 2.0  # of a stiffness: no tolerance of a material or a joint doubles or halves it
 
 
@@ -186,6 +189,44 @@ def scale(evidence: Evidence) -> Iterator[Check]:
         unit="dB",
         says=fitted.statement,
         advice="" if is_known else "calibrate the test, or use the prediction's shape only",
+    )
+
+
+def level(evidence: Evidence) -> Iterator[Check]:
+    """Say where measured amplitudes are off those of the model, all by one factor: its mass is in doubt.
+
+    Poles and zeros do not tell a mass. A unit or sensitivity of the test that is wrong looks alike.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+
+    Yields
+    ------
+    Check
+        One, where the factor is beyond its own error and what masses of models are off.
+    """
+    updated = evidence.updated_model
+    is_updated = updated.expansion is None  # measured shapes have the measured amplitudes
+    fitted = updated.scale if is_updated else updated.nominal_scale
+    doubt = float(np.log(fitted.level))
+    if fitted.is_relative:
+        return
+    if abs(doubt) <= NO_CHANCE * np.hypot(fitted.level_std, MASS_STD):
+        return
+    low, high = (np.exp(doubt + side * NORMAL_90 * fitted.level_std) for side in (-1, 1))
+    mass = f"{100 * abs(np.expm1(-doubt)):.2g} % {'heavier' if doubt < 0 else 'lighter'}"
+    yield Check(
+        name="mass of the model",
+        verdict=Verdict.WITH_CARE,
+        figure=fitted.level,
+        limit=1.0,
+        unit="1",
+        says=f"measured amplitudes of modes are {fitted.level:.3g} times those of the model (90 %: {low:.3g} to "
+        f"{high:.3g}): either the structure is {mass} than its model in these modes, or a unit or sensitivity of "
+        f"the test is off; {'bands reach from one to the other' if is_updated else 'the prediction goes by the test'}",
+        advice="weigh the structure and compare with its model; look at the sensitivities of force and responses",
     )
 
 

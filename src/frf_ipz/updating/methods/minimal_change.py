@@ -20,7 +20,7 @@ from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.low_rank import factorise
 from frf_ipz.updating.along_structure import part_table
 from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
-from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble
+from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble, draw_parameters
 from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, frame_of, modal_frame, modal_parameters
 from frf_ipz.updating.minimal_change.outliers import EXCLUDED_STD, contradicted_targets, unmet_targets
@@ -45,6 +45,7 @@ SMALLEST_NOISE = 1e-6  # relative standard deviation of a frequency: none is mea
 OF_DAMPING = 1.0  # change of the logarithm of a modulus by damping, from which damping makes a root
 UNKNOWN_STD = 1e15  # relative, of what is no target: however far its root runs, and with it what moves it
 STEPS_BACK = 16  # to the nominal model: so many that roots keep the greater part of their vectors over each
+MASS_DRAWS, SURELY = 200, 0.95  # of masses of sensors; share of them below nothing from which a mass is none
 SHIFTED = 0.1  # standard deviations of a modulus from which the stiffness is updated again for the change by damping
 
 
@@ -68,7 +69,7 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     if not len(problem.values):
         return nothing_to_do(problem.model, "minimal-change")
     frame = frame_of(problem.model)
-    update_of = _solve(problem, frame, options, progress)
+    update_of = _solve_with_masses(problem, frame, options, progress)
     pairs, again = None, problem.pair_again
     for _ in range(ROUNDS):
         if again is None:
@@ -76,7 +77,8 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
         paired = again.with_model(problem, update_of.model, pairs or again.pairs, update_of.values)
         if paired is None:
             break
-        further = _solve(paired[1], frame, options, progress, start=update_of)
+        targets = replace(paired[1], basis=update_of.problem.basis)
+        further = _solve(targets, frame, options, progress, start=update_of)
         if not again.deviation_db(further.model) < again.deviation_db(update_of.model):
             break
         pairs, update_of = paired[0], further
@@ -107,6 +109,26 @@ class _Update:
     def values(self) -> ComplexArray:
         tracked = self.posterior.damping_result.tracked.values(len(self.problem.values))
         return self.problem.nearest_roots(self.model, tracked)
+
+
+def _solve_with_masses(
+    problem: UpdateProblem, frame: ModalFrame, options: UpdateOptions, progress: Progress
+) -> _Update:
+    """Leave out masses of sensors that would have to be less than nothing.
+
+    A prior that is symmetric about 0 allows them, and where a change of the stiffness is less likely than many of them
+    together, they take its place: poles and zeros are met, and the FRFs at other points are not.
+    """
+    update_of = _solve(problem, frame, options, progress)
+    while problem.basis is not None and problem.basis.attached:
+        attached = np.array(problem.basis.attached)
+        drawn = draw_parameters(update_of.posterior, np.random.default_rng(options.seed), MASS_DRAWS)
+        below = attached[np.mean(drawn[:, attached] < 0.0, axis=0) > SURELY]
+        if not len(below):
+            break
+        problem = replace(problem, basis=problem.basis.without_attached(below.tolist()))
+        update_of = _solve(problem, frame, options, progress)
+    return update_of
 
 
 def _solve(

@@ -84,6 +84,27 @@ def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) ->
     return np.stack([frame.from_modal(mass), frame.from_modal(damping), frame.from_modal(stiffness)], axis=1), theta
 
 
+def draw_parameters(posterior: Posterior, rng: np.random.Generator, count: int) -> FloatArray:
+    """Draw parameters of stiffness and mass.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Of an update.
+    rng : Generator
+        Source of randomness.
+    count : int
+        Number of draws.
+
+    Returns
+    -------
+    (count, p) array
+        Whether or not they make a structure.
+    """
+    phase, result = posterior.stiffness, posterior.stiffness_result
+    return unwhiten(phase.terms, result.scales[:-1], _draw(phase, result, rng, count))
+
+
 def _draw_stiffness(
     posterior: Posterior, rng: np.random.Generator, count: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:

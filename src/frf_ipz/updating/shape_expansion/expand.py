@@ -181,10 +181,10 @@ def _calibrations(left_out: LeftOutPoints, is_inner: BoolArray) -> tuple[float, 
     inner = [errors for errors, use in zip(left_out.errors, counts & is_inner, strict=True) if use]
     outer = [errors for errors, use in zip(left_out.errors, counts & ~is_inner, strict=True) if use]
     if not inner:
-        worst = max(calibrate([errors]) for errors in outer)
+        worst = max(calibrate([errors], n_points=len(outer)) for errors in outer)
         return worst, worst
     between = calibrate(inner)
-    return between, max(between, calibrate(outer)) if outer else between
+    return between, max(between, calibrate(outer, n_points=len(inner) + len(outer))) if outer else between
 
 
 def _split_modes(modes: ExpandedModes) -> tuple[tuple[float, ...], ...]:

@@ -62,6 +62,22 @@ class ExpandedModes:
         """(m, n_modes) measured modes in those of the model, mass-normalised in the unit of the model."""
         return np.asarray(np.stack([shape.amplitudes for shape in self.shapes], axis=1) / np.sqrt(self.unit))
 
+    def with_splits(self, log_ratios: FloatArray) -> ExpandedModes:
+        """Take other sizes of the two sides of the test, whose products stay.
+
+        Parameters
+        ----------
+        log_ratios : (n_modes,) array
+            Logarithm of the factor on what excited DOFs move.
+
+        Returns
+        -------
+        ExpandedModes
+            With shapes that follow.
+        """
+        pairs = zip(self.shapes, log_ratios.tolist(), strict=True)
+        return replace(self, shapes=tuple(shape.with_split(log_ratio) for shape, log_ratio in pairs))
+
 
 def expand_modes(model: ReducedModel, measured: MeasuredShapes, *, error: float, is_scale_known: bool) -> ExpandedModes:
     """Expand all measured modes over a model.
@@ -151,10 +167,14 @@ def build_expanded_model(
     ensemble : (count, 3, n, n) array
         Mass, damping and stiffness of the members.
     """
-    modal, amplitudes = modes.model, modes.amplitudes
+    modal = modes.model
     remaining = np.eye(len(modal.omega))[:, modes.remains] * np.sqrt(modes.gain / modes.unit)
-    beside = np.hstack([np.zeros((len(modal.shapes), remaining.shape[1])), _beside_the_field(model, modes)])
-    retained = modal.shapes @ np.hstack([remaining, amplitudes]) + beside
+
+    def at_retained(of_modes: ExpandedModes, besides: FloatArray | float = 0.0) -> FloatArray:
+        measured = modal.shapes @ (of_modes.amplitudes + besides) + _beside_the_field(model, of_modes)
+        return np.hstack([modal.shapes @ remaining, measured])
+
+    retained = at_retained(modes)
     hidden = _completion(retained)
     poles = modes.measured.poles
     is_rigid = _rigid(model, modal)[modes.remains]
@@ -163,19 +183,24 @@ def build_expanded_model(
     squares = np.concatenate([np.where(is_rigid, 0.0, modal.omega[modes.remains] ** 2), np.abs(poles) ** 2])
 
     def matrices(drawn: FloatArray) -> FloatArray:
-        frame = np.vstack([modal.shapes @ np.hstack([remaining, drawn]) + beside, hidden])
-        inverse = np.linalg.inv(frame)
+        inverse = np.linalg.inv(np.vstack([drawn, hidden]))
         parts = [(inverse.T * weights) @ inverse for weights in (np.ones(len(rates)), rates, squares)]
         return np.array([(part + part.T) / 2 for part in parts])
 
-    mass, damping, stiffness = matrices(amplitudes)
+    mass, damping, stiffness = matrices(retained)
     roots = [_root(shape.covariance) * calibration / np.sqrt(modes.unit) for shape in modes.shapes]
     rng = np.random.default_rng(seed)
     # drawn at the DOFs: signs of modes, and how equal ones share their space, are up to rounding
     normal = rng.standard_normal((count, len(roots), len(model.mass))) @ (modal.shapes.T @ _root(model.mass)).T
+    splits = calibration * rng.standard_normal((count, len(roots))) * [float(shape.split_std) for shape in modes.shapes]
     members = [
-        matrices(amplitudes + np.stack([root @ draw for root, draw in zip(roots, draws, strict=True)], axis=1))
-        for draws in normal
+        matrices(
+            at_retained(
+                modes.with_splits(split),
+                np.stack([root @ draw for root, draw in zip(roots, draws, strict=True)], axis=1),
+            )
+        )
+        for draws, split in zip(normal, splits, strict=True)
     ]
     order = len(mass)
     expansion, expanded_dofs = _with_hidden(model, len(hidden))

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from scipy.optimize import brentq
+    from scipy.special import stdtrit
 
     from frf_ipz.arrays import ComplexArray
     from frf_ipz.dofs import AnyDof
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from frf_ipz.updating.updated_model import UpdatedModel
 else:
     brentq = import_late("scipy.optimize", "brentq")
+    stdtrit = import_late("scipy.special", "stdtrit")
 
 LINES = 300  # of the band, at equal ratios
 FEWEST = 3  # points of a side: of two, one alone would tell the other's shape
@@ -54,15 +56,19 @@ class ShapeErrors:
     own_variance: FloatArray
 
 
-def calibrate(errors: Sequence[ShapeErrors]) -> float:
-    """Give the factor on stated standard deviations with which they hold 90 % of the modes at left-out points.
+def calibrate(errors: Sequence[ShapeErrors], *, n_points: int | None = None) -> float:
+    """Give the factor on stated standard deviations with which they hold 90 % of the modes at a further point.
 
     What was measured at a left-out point has an error of its own, which a point of interest has not: it comes off.
+    Errors of one point have much in common, so that few points tell the factor hardly: that of a further point has a
+    Student distribution with as many degrees of freedom as there are points.
 
     Parameters
     ----------
     errors : sequence of ShapeErrors
         Of the points, taken together.
+    n_points : int, optional
+        How many tell by how much such a factor varies; as many where it is left out.
 
     Returns
     -------
@@ -76,10 +82,12 @@ def calibrate(errors: Sequence[ShapeErrors]) -> float:
     def excess(logarithm: float) -> float:
         return float(np.quantile(squares / (np.exp(2 * logarithm) * stated + own), COVERED)) - COVERED_SQUARE
 
-    if excess(0.0) <= 0.0:
+    of_few = float(stdtrit(n_points or len(errors), (1 + COVERED) / 2) / np.sqrt(COVERED_SQUARE))
+    least = -np.log(of_few)
+    if excess(least) <= 0.0:
         return 1.0
     alone = 0.5 * np.log(float(np.quantile(squares / stated, COVERED)) / COVERED_SQUARE)  # without errors of their own
-    return float(np.exp(brentq(excess, 0.0, alone + 1.0)))
+    return of_few * float(np.exp(brentq(excess, least, alone + 1.0)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

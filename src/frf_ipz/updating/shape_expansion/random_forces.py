@@ -13,7 +13,7 @@ coherent synthesis of observation data and model predictions, Computer Methods i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -114,10 +114,13 @@ class ExpandedShape:
 
     Parameters
     ----------
-    amplitudes : (..., m) array
-        Of the model's modes, with which shape times shape is the measured amplitude.
+    of_outputs, of_inputs : (..., m) array
+        What sensors and excited DOFs tell of the amplitudes of the model's modes.
     covariance : (..., m, m) array
-        Of these.
+        Of these amplitudes, for sizes of both sides as they are.
+    split_std : (...) array
+        Standard deviation of the logarithm of the size of one side: only the product of both sizes is measured, and
+        either follows from the other as the model has it.
     at_outputs, at_inputs : (..., n_outputs), (..., n_inputs) array
         The measured shape, in the same unit.
     sign : (...) array
@@ -126,12 +129,41 @@ class ExpandedShape:
         Logarithm of the probability of the directions measured, but for a constant.
     """
 
-    amplitudes: FloatArray
+    of_outputs: FloatArray
+    of_inputs: FloatArray
     covariance: FloatArray
+    split_std: FloatArray
     at_outputs: FloatArray
     at_inputs: FloatArray
     sign: FloatArray
     log_evidence: FloatArray
+
+    @property
+    def amplitudes(self) -> FloatArray:
+        """(..., m) of the model's modes, with which shape times shape is the measured amplitude."""
+        return self.of_outputs + self.of_inputs
+
+    def with_split(self, log_ratio: float) -> ExpandedShape:
+        """Make the excited DOFs move more and the sensors less, so that their products stay.
+
+        Parameters
+        ----------
+        log_ratio : float
+            Logarithm of the factor on what excited DOFs move.
+
+        Returns
+        -------
+        ExpandedShape
+            The mean of the field under that condition.
+        """
+        ratio = np.exp(log_ratio)
+        return replace(
+            self,
+            of_outputs=self.of_outputs / ratio,
+            of_inputs=self.of_inputs * ratio,
+            at_outputs=self.at_outputs / ratio,
+            at_inputs=self.at_inputs * ratio,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -245,12 +277,18 @@ def expand_shape(model: ModalModel, measured: MeasuredShapes, mode: int, error: 
     sign = np.where(by_force @ output <= 0, 1.0, -1.0)  # with which the forces are least
     root = np.sqrt(measured.size[mode])
     values = root * (ratio * output + sign[..., None] * force / ratio)
-    weights = root * (ratio * by_output + sign[..., None] * by_force / ratio)
+    of_outputs = root * ratio * by_output
+    of_inputs = root * sign[..., None] * by_force / ratio
+    weights = of_outputs + of_inputs
+    # both sides alone: by the curvature of the square over the logarithm of the ratio of their sizes
+    alone = 2 * root**2 * np.sqrt((by_output @ output) * (by_force @ force))
     square, degrees = np.sum(values * weights, axis=-1), max(count - 1, 1)
     left_over = power[..., None] * np.eye(power.shape[-1]) - spread @ solved[..., 2:]
     log_determinant = np.linalg.slogdet(total)[1]
     return ExpandedShape(
-        amplitudes=(spread @ weights[..., None])[..., 0],
+        of_outputs=(spread @ of_outputs[..., None])[..., 0],
+        of_inputs=(spread @ of_inputs[..., None])[..., 0],
+        split_std=np.sqrt(square / degrees / (2 * alone)),
         covariance=np.asarray(left_over * square[..., None, None] / degrees),
         at_outputs=values[..., :n_outputs],
         at_inputs=values[..., n_outputs:],

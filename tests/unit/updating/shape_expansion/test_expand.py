@@ -9,7 +9,7 @@ from scipy import sparse
 import frf_ipz
 from frf_ipz.export.state_space import make_state_space
 from frf_ipz.updating.shape_expansion.attached_masses import attachment_places, find_attached_masses
-from frf_ipz.updating.shape_expansion.expanded_model import expand_modes
+from frf_ipz.updating.shape_expansion.expanded_model import build_expanded_model, expand_modes
 from frf_ipz.updating.shape_expansion.left_out_points import ShapeErrors, calibrate, leave_points_out
 from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes
 from frf_testbench.updating.synthetic_fit import TrueModes, simulate_fit
@@ -238,6 +238,57 @@ def test_stated_deviations_are_calibrated_beside_the_errors_of_what_was_left_out
 def test_stated_deviations_never_shrink():
     exact = ShapeErrors(difference=np.zeros(5), variance=np.ones(5), own_variance=np.zeros(5))
     assert calibrate([exact]) == 1.0
+
+
+def test_few_points_tell_hardly_by_how_much_a_further_one_is_off():
+    rng = np.random.default_rng(2)
+    factors = np.exp(rng.normal(0.0, 0.5, 4000))
+    errors = [
+        ShapeErrors(difference=3 * factor * rng.normal(size=10), variance=np.ones(10), own_variance=np.zeros(10))
+        for factor in factors
+    ]
+    held = [
+        np.mean(np.abs(errors[place].difference) < 1.645 * calibrate(errors[place + 1 : place + 4]))
+        for place in range(0, 4000, 4)
+    ]
+    assert 0.88 < np.mean(held) < 0.96  # 0.80 where three points are taken for as good as many
+
+
+@pytest.fixture(scope="module")
+def struck_far_from_the_sensor():
+    """Five struck points and a lone sensor beyond them, expanded: the model, its members, and what was measured."""
+    sensor, struck = frf_ipz.Dof(39, "z"), [frf_ipz.Dof(node, "z") for node in (3, 9, 15, 21, 27)]
+    labels = tuple(frf_ipz.FrfLabel(sensor, force, frf_ipz.FrfQuantity.RECEPTANCE) for force in struck)
+    truth = TrueModes(make_truth(resonator_hz=180.0), np.full(60, 0.005))
+    fit = simulate_fit(truth, labels, BAND_HZ, rng=np.random.default_rng(5))
+    reduced_model = frf_ipz.reduce_model(fit, make_nominal())
+    measured = measured_shapes(fit)
+    modes = expand_modes(reduced_model, measured, error=1e-3, is_scale_known=True)
+    model, members = build_expanded_model(reduced_model, modes, count=60, calibration=1.0, seed=0)
+    return modes, model, members, sensor, struck
+
+
+def test_how_far_struck_points_move_over_a_sensor_beyond_them_is_known_as_well_as_the_model_says(
+    struck_far_from_the_sensor,
+):
+    modes, model, members, sensor, struck = struck_far_from_the_sensor
+    s = 1j * modes.measured.omega[-1:]
+
+    def spread(output):
+        label = frf_ipz.FrfLabel(output, struck[0], frf_ipz.FrfQuantity.RECEPTANCE)
+        models = (replace(model, mass=mass, damping=loss, stiffness=stiffness) for mass, loss, stiffness in members)
+        return np.std(np.log(np.abs([frf_ipz.compute_frfs(member, [label], s)[0, 0] for member in models])))
+
+    assert spread(sensor) < 0.1 * spread(struck[1])  # which was measured
+    assert spread(struck[1]) == pytest.approx(2 * modes.shapes[-1].split_std, rel=0.5)
+    assert modes.shapes[-1].split_std > 0.01
+
+
+def test_another_split_leaves_what_was_measured(struck_far_from_the_sensor):
+    shape = struck_far_from_the_sensor[0].shapes[0]
+    other = shape.with_split(0.3)
+    np.testing.assert_allclose(np.outer(other.at_outputs, other.at_inputs), np.outer(shape.at_outputs, shape.at_inputs))
+    np.testing.assert_allclose(other.at_inputs, shape.at_inputs * np.exp(0.3))
 
 
 def test_a_point_with_a_wrong_gain_does_not_move_the_others(left_out):
