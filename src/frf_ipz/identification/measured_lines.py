@@ -97,6 +97,8 @@ class MeasuredLines:
         Which FRFs share a force, by its number.
     force_noise : ForceNoise or None
         The part of the variance that neighbouring lines share, where it is known.
+    missing_force : (n_lines, n_frfs) complex array or None
+        What records lack of the force, over what they hold of it, where they begin within its pulse.
     """
 
     frequency_hz: FloatArray
@@ -108,6 +110,7 @@ class MeasuredLines:
     powers: IntArray
     force: IntArray
     force_noise: ForceNoise | None = None
+    missing_force: ComplexArray | None = None
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -219,6 +222,7 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
         powers=powers,
         force=np.unique([str(label.input_dof) for label in frfs.labels], return_inverse=True)[1],
         force_noise=lines.force_noise,
+        missing_force=lines.missing_force,
     )
 
 

@@ -278,11 +278,12 @@ def test_one_channel_that_is_late_is_named():
     assert any(f"{frfs.labels[0].output_dof} +1.953 ms" in text for text in fit.warnings), fit.warnings
 
 
-def test_the_deviation_of_a_common_delay_is_true():
+@pytest.mark.parametrize("noise", [0.02, 1e-4])
+def test_the_deviation_of_a_common_delay_is_true(noise):
     truth = random_modes(SPREAD, 0.005, n_outputs=2, n_inputs=1, seed=SEED)
     errors = []
     for seed in range(12):
-        frfs = accelerances(truth, LINES_HZ[3::4], noise=0.02, seed=seed)
+        frfs = accelerances(truth, LINES_HZ[3::4], noise=noise, seed=seed)
         late = replace(frfs, values=frfs.values * np.exp(-frfs.s[:, None] * 1e-3))
         lines = measured_lines(late, FitOptions())
         terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(3)
