@@ -188,6 +188,9 @@ class FrfSet(Tabulated, Drawn):
         evidence takes one in so many.
     force_noise : ForceNoise, optional
         The part of `variance` that neighbouring lines share.
+    missing_force : (n_lines, n_frfs) complex array, optional
+        About what records lack of the force as they begin within its pulse, over what they hold of it: FRFs are too
+        large by this part. All of it is in `variance`.
 
     Raises
     ------
@@ -224,6 +227,7 @@ class FrfSet(Tabulated, Drawn):
     unknown_scale: str = "none"
     correlated_lines: int = 1
     force_noise: ForceNoise | None = None
+    missing_force: ComplexArray | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.frequency_hz), len(self.labels))
@@ -233,6 +237,9 @@ class FrfSet(Tabulated, Drawn):
         require_finite("the FRFs' values", self.values)
         if self.force_noise is not None:
             require_shape("the FRFs' force_noise", self.force_noise.relative, shape)
+        if self.missing_force is not None:
+            require_shape("the FRFs' missing_force", self.missing_force, shape)
+            object.__setattr__(self, "missing_force", read_only(self.missing_force))
         for name in ARRAYS:
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
@@ -420,6 +427,7 @@ class FrfSet(Tabulated, Drawn):
             self,
             frequency_hz=self.frequency_hz[used],
             force_noise=None if self.force_noise is None else self.force_noise.of(used, slice(None)),
+            missing_force=None if self.missing_force is None else self.missing_force[used],
             **{name: getattr(self, name)[used] for name in rows},
         )
 
@@ -443,6 +451,7 @@ class FrfSet(Tabulated, Drawn):
             labels=tuple(self.labels[index] for index in selected),
             averages=self.averages[selected],
             force_noise=None if self.force_noise is None else self.force_noise.of(slice(None), selected),
+            missing_force=None if self.missing_force is None else self.missing_force[:, selected],
             **{name: getattr(self, name)[:, selected] for name in columns},
         )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.errors import InputError
-from frf_ipz.identification.noise import BLOCK_LINES, misfit_variance, rough_variance
+from frf_ipz.identification.noise import BLOCK_LINES, law_of_squares, misfit_variance, rough_variance
 
 if TYPE_CHECKING:
     from frf_ipz.frf import ForceNoise, FrfSet
@@ -97,6 +97,8 @@ class MeasuredLines:
         Which FRFs share a force, by its number.
     force_noise : ForceNoise or None
         The part of the variance that neighbouring lines share, where it is known.
+    missing_force : (n_lines, n_frfs) complex array or None
+        What records lack of the force, over what they hold of it, where they begin within its pulse.
     """
 
     frequency_hz: FloatArray
@@ -108,6 +110,7 @@ class MeasuredLines:
     powers: IntArray
     force: IntArray
     force_noise: ForceNoise | None = None
+    missing_force: ComplexArray | None = None
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -219,6 +222,7 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
         powers=powers,
         force=np.unique([str(label.input_dof) for label in frfs.labels], return_inverse=True)[1],
         force_noise=lines.force_noise,
+        missing_force=lines.missing_force,
     )
 
 
@@ -246,6 +250,27 @@ def with_misfit_noise(lines: MeasuredLines, misfit: ComplexArray) -> MeasuredLin
     noise = misfit_variance(misfit * to_measured, size * to_measured) / to_measured**2
     variance[:, ~lines.known] = (noise + (MODEL_ERROR * size) ** 2)[:, ~lines.known]
     return replace(lines, variance=variance)
+
+
+def misfit_square(lines: MeasuredLines, misfit: ComplexArray) -> FloatArray:
+    """Give the mean square of the misfit of a model, smooth over the lines as noise is.
+
+    Parameters
+    ----------
+    lines : MeasuredLines
+        The lines that are fitted.
+    misfit : (n_lines, n_frfs) complex array
+        Measured minus model, as receptances.
+
+    Returns
+    -------
+    (n_lines, n_frfs) array
+        As receptances, (m/N)^2: noise, and what the model does not follow.
+    """
+    to_measured = np.abs(lines.s[:, None]) ** lines.powers
+    size = np.abs(lines.receptance)
+    square = law_of_squares(np.abs(misfit * to_measured) ** 2, size * to_measured) / to_measured**2
+    return np.asarray(square + (LEAST_NOISE * size) ** 2)
 
 
 def _usable(frfs: FrfSet, known: BoolArray) -> BoolArray:

@@ -30,7 +30,7 @@ def rough_variance(values: ComplexArray) -> FloatArray:
     (n_lines, n_frfs) array
         E of the squared modulus of the noise, smooth over the lines.
     """
-    return smooth_level(_squared_differences(values))
+    return smooth_level(squared_differences(values))
 
 
 def misfit_variance(misfit: ComplexArray, size: FloatArray) -> FloatArray:
@@ -51,11 +51,28 @@ def misfit_variance(misfit: ComplexArray, size: FloatArray) -> FloatArray:
     (n_lines, n_frfs) array
         E of the squared modulus of the noise.
     """
-    squares = _squared_differences(misfit)
+    return law_of_squares(squared_differences(misfit), size)
+
+
+def law_of_squares(squares: FloatArray, size: FloatArray) -> FloatArray:
+    """Smooth squares by the law, constant or in proportion to the FRF, that suits each block of lines better.
+
+    Parameters
+    ----------
+    squares : (n_lines, n_frfs) array
+        Squared moduli of noise.
+    size : (n_lines, n_frfs) array
+        Modulus of the FRFs.
+
+    Returns
+    -------
+    (n_lines, n_frfs) array
+        E of the squares.
+    """
     constant_level = smooth_level(squares)
     power = np.maximum(size**2, TINY)
     proportional_level = smooth_level(squares / power) * power
-    block = np.minimum(np.arange(len(misfit)) // BLOCK_LINES, max(0, len(misfit) // BLOCK_LINES - 1))
+    block = np.minimum(np.arange(len(squares)) // BLOCK_LINES, max(0, len(squares) // BLOCK_LINES - 1))
     starts = np.flatnonzero(np.diff(block, prepend=-1))
     # minus the logarithm of the likelihood of exponentially distributed squares
     costs = [
@@ -90,7 +107,19 @@ def smooth_level(squares: FloatArray) -> FloatArray:
     return np.asarray(np.exp(np.stack([np.interp(lines, middles, level) for level in levels.T], axis=1)))
 
 
-def _squared_differences(values: ComplexArray) -> FloatArray:
+def squared_differences(values: ComplexArray) -> FloatArray:
+    """Give squares of what differs from line to line.
+
+    Parameters
+    ----------
+    values : (n_lines, n_frfs) complex array
+        FRFs, or what a model leaves of them.
+
+    Returns
+    -------
+    (n_lines, n_frfs) array
+        Of third differences: their expectation is that of the noise.
+    """
     weights = np.array([(-1) ** k * comb(DIFFERENCE, k) for k in range(DIFFERENCE + 1)])
     weights = weights / np.linalg.norm(weights)
     count = len(values) - DIFFERENCE

@@ -16,6 +16,7 @@ from frf_ipz.quantities import FrfQuantity
 from synthetic_frfs import accelerances, count, frf_set, labels_of, normalised_errors, random_modes, with_noise
 
 LINES_HZ = np.arange(1, 4097) * 0.25
+TO_400_HZ = LINES_HZ[3:1600:4]
 SPREAD = np.array([60.0, 135.0, 210.0, 340.0, 430.0, 520.0, 655.0, 790.0, 910.0])
 CALIBRATED = 0.5  # 3 standard deviations of the rms of 18 normalised errors
 SEED = 77
@@ -193,6 +194,34 @@ def test_noise_that_was_not_measured():
     assert fit.noise_from == "misfit"
 
 
+@pytest.mark.parametrize("law", ["even", "in proportion"])
+def test_less_noise_than_a_part_in_a_thousand_that_was_not_measured(law):
+    """The fit itself shows it, and deviations follow."""
+    truth = random_modes(SPREAD[:4], 0.01, n_outputs=3, n_inputs=1, seed=SEED)
+    exact = accelerances(truth, TO_400_HZ, noise=0.0).values
+    size = np.abs(exact) if law == "in proportion" else np.sqrt(np.mean(np.abs(exact) ** 2, axis=0))
+    errors = []
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        noisy = with_noise(TO_400_HZ, exact, labels_of(3, 1), 2e-4 * size, rng)
+        fit = fit_modes(frf_set(noisy.frequency_hz, noisy.values, noisy.labels))
+        assert_complete(fit, truth)
+        errors.append(normalised_errors(fit, truth.poles))
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(1.0, abs=CALIBRATED)
+
+
+def test_an_error_that_neighbouring_lines_share_is_no_noise():
+    """Half a part in a thousand, but alike over a peak: deviations do not fall below a part in a thousand a line."""
+    truth = random_modes(SPREAD[:4], 0.01, n_outputs=3, n_inputs=1, seed=SEED)
+    clean = accelerances(truth, TO_400_HZ, noise=1e-5)
+    wave = np.sin(2 * np.pi * TO_400_HZ[:, None] / 31.0)
+    deviations = [
+        np.sqrt(fit_modes(frf_set(clean.frequency_hz, values, clean.labels)).covariance[1, 1])
+        for values in (clean.values, clean.values * (1 + 5e-4 * wave))
+    ]
+    assert deviations[1] > 4 * deviations[0]
+
+
 def test_a_band_that_does_not_start_at_zero():
     truth = random_modes(SPREAD, 0.005, seed=SEED)
     fit = fit_modes(accelerances(truth, LINES_HZ, seed=SEED), options=FitOptions(band_hz=(300.0, 860.0)))
@@ -278,11 +307,12 @@ def test_one_channel_that_is_late_is_named():
     assert any(f"{frfs.labels[0].output_dof} +1.953 ms" in text for text in fit.warnings), fit.warnings
 
 
-def test_the_deviation_of_a_common_delay_is_true():
+@pytest.mark.parametrize("noise", [0.02, 1e-4])
+def test_the_deviation_of_a_common_delay_is_true(noise):
     truth = random_modes(SPREAD, 0.005, n_outputs=2, n_inputs=1, seed=SEED)
     errors = []
     for seed in range(12):
-        frfs = accelerances(truth, LINES_HZ[3::4], noise=0.02, seed=seed)
+        frfs = accelerances(truth, LINES_HZ[3::4], noise=noise, seed=seed)
         late = replace(frfs, values=frfs.values * np.exp(-frfs.s[:, None] * 1e-3))
         lines = measured_lines(late, FitOptions())
         terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(3)

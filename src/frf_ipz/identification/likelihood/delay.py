@@ -1,8 +1,8 @@
 """Pure delays of output channels, as filters and converters cause them.
 
 Poles held, the best delay is where residues and smooth terms explain the most of ``exp(s delay) y``. Delays and
-residues act very differently over a band of several modes, so a grid that is refined finds it. Where the best of the
-grid is at its end, it goes on beyond.
+residues act very differently over a band of several modes, so a grid that is refined, and a parabola through its
+last points, find it. Where the best of the grid is at its end, it goes on beyond.
 """
 
 from __future__ import annotations
@@ -74,6 +74,9 @@ def _best_delay(rows: ComplexArray, s: ComplexArray, basis: FloatArray, period: 
     delay = float(grid[best])
     for _ in range(REFINEMENTS - 1):
         grid = delay + step * np.linspace(-1, 1, 11)
-        delay = float(grid[int(np.argmax(explained(grid)))])
-        step *= 2 * FINER
-    return delay
+        values = explained(grid)
+        best = int(np.argmax(values))
+        delay, step = float(grid[best]), 2 * FINER * step
+    before, at, after = values[[max(best - 1, 0), best, min(best + 1, len(grid) - 1)]].tolist()
+    bend = before - 2 * at + after
+    return delay + (step * (before - after) / (2 * bend) if bend < 0 else 0.0)  # to the top of the parabola

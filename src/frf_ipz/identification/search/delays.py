@@ -16,9 +16,11 @@ import numpy as np
 from scipy import special
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.identification.likelihood.compression import column_gains, compress
+from frf_ipz.identification.likelihood.compression import column_gains, compress, model_columns
 from frf_ipz.identification.likelihood.delay import find_delays
+from frf_ipz.identification.likelihood.sandwich import NoiseInTime
 from frf_ipz.identification.measured_lines import MeasuredLines, WeightedLines
+from frf_ipz.numerics.partial_fractions import stacked, unstacked
 
 if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
 ROUNDS = 2  # of finding delays and poles in turn
 MOST = 0.5  # of the misfit, and of the modes
 FEWEST_MODES = 3  # whose phases tell a delay from complex modes
-STEP = 0.01  # of the shortest period, over which the misfit is differentiated
+CHANCE = 0.05  # that delays of FRFs, which are the same, differ so much that the deviation is raised
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,18 +175,55 @@ def measure_delay(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms,
     Returns
     -------
     CommonDelay
-        By the curvature of the misfit, or by the scatter over FRFs where that is more.
+        By the noise, that which lines share included, and by the scatter over FRFs where that is more than chance.
+        Where records begin within the pulse, by as much as what they lack of it makes of a delay.
     """
     n_frfs = lines.receptance.shape[1]
-    step = STEP * 2 * np.pi / float(np.abs(lines.s[-1]))
-    before, at, after = (
-        _misfit(_normal(lines.advanced(np.full(n_frfs, delay_s + change))), poles, terms)
-        for change in (-step, 0.0, step)
-    )
-    curvature = (before - 2 * at + after) / step**2
-    by_noise = float(np.sqrt(2 / curvature * max(1.0, at / (2.0 * lines.receptance.size)))) if curvature > 0 else np.inf
-    each = find_delays(_normal(lines.advanced(np.full(n_frfs, delay_s))), poles, terms, np.arange(n_frfs))
-    return CommonDelay(delay_s=delay_s, std_s=max(by_noise, _std_of_median(each)))
+    late = lines.advanced(np.full(n_frfs, delay_s))
+    data = _normal(late)
+    columns = model_columns(data.s, poles, terms, real_modes=True) * np.tile(data.profile, 2)[:, None]
+    basis = np.linalg.qr(columns)[0]
+
+    def beside_modes(values: ComplexArray) -> ComplexArray:
+        weighted = stacked(values * data.weight)
+        return unstacked(weighted - basis @ (basis.T @ weighted))
+
+    slopes, misfit = beside_modes(data.receptance * data.s[:, None]), beside_modes(data.receptance)
+    information = np.sum(np.abs(slopes) ** 2, axis=0)
+    each_s = -np.sum((slopes.conj() * misfit).real, axis=0) / information
+    own, shared = _variances_of_sums(late, slopes * data.weight)
+    own = own * max(1.0, float(np.mean(np.abs(misfit) ** 2)) / 2)
+    differs = np.sum((each_s - np.average(each_s, weights=information**2 / own)) ** 2 * information**2 / own)
+    if n_frfs > 1 and differs > special.chdtri(n_frfs - 1, CHANCE):
+        own = own * differs / (n_frfs - 1)
+    variance = (np.sum(own) + shared) / np.sum(information) ** 2 + _by_missing_force(late, poles, terms) ** 2
+    return CommonDelay(delay_s=delay_s, std_s=float(np.sqrt(variance)))
+
+
+def _variances_of_sums(lines: MeasuredLines, factors: ComplexArray) -> tuple[FloatArray, float]:
+    """Give the variance of the real part of the noise times conjugate factors: of each FRF, and what they share."""
+    own, shared = lines.variance, 0.0
+    if lines.missing_force is not None:
+        own = own - np.abs(lines.receptance * lines.missing_force) ** 2
+    if lines.force_noise is not None:
+        noise = lines.force_noise
+        of_force = NoiseInTime.within(lines.frequency_hz, noise.interval_s)
+        error = lines.receptance * noise.relative
+        own = own - np.abs(error) ** 2
+        error = error * np.exp(-2j * np.pi * lines.frequency_hz * np.mean(noise.interval_s))[:, None]
+        for force in np.unique(noise.force):
+            alike = noise.force == force
+            sums = np.sum(factors[:, alike].conj() * error[:, alike], axis=1, keepdims=True)
+            shared += float(np.sum(of_force(sums) ** 2))
+    return np.sum(np.abs(factors) ** 2 * np.maximum(own, 0.0) / 2, axis=0), shared
+
+
+def _by_missing_force(late: MeasuredLines, poles: ComplexArray, terms: SmoothTerms) -> float:
+    """Give the delay that records seem to have because they begin within the pulse, s."""
+    if late.missing_force is None:
+        return 0.0
+    whole = replace(late, receptance=late.receptance / (1 + late.missing_force))
+    return float(np.ptp([delay_of_normal_modes(lines, poles, terms)[0] for lines in (late, whole)]))
 
 
 def delay_of_normal_modes(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms) -> tuple[float, float]:
@@ -209,12 +248,6 @@ def delay_of_normal_modes(lines: MeasuredLines, poles: ComplexArray, terms: Smoo
     n_frfs = lines.receptance.shape[1]
     delays_s = find_delays(_normal(lines), poles, terms, np.zeros(n_frfs, np.int64))
     return float(delays_s[0]), _misfit(_normal(lines.advanced(delays_s)), poles, terms)
-
-
-def _std_of_median(values: FloatArray) -> float:
-    """Give the standard deviation of the median of normally distributed values by their own scatter."""
-    deviation = np.median(np.abs(values - np.median(values))) / special.ndtri(0.75)
-    return float(np.sqrt(np.pi / 2) * deviation / np.sqrt(len(values)))
 
 
 def _normal(lines: MeasuredLines) -> WeightedLines:

@@ -26,7 +26,14 @@ from frf_ipz.identification.likelihood.compression import (
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
 from frf_ipz.identification.likelihood.sandwich import pole_variance_factors
 from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms, smooth_terms_of_band
-from frf_ipz.identification.measured_lines import MeasuredLines, WeightedLines, measured_lines, with_misfit_noise
+from frf_ipz.identification.measured_lines import (
+    MeasuredLines,
+    WeightedLines,
+    measured_lines,
+    misfit_square,
+    with_misfit_noise,
+)
+from frf_ipz.identification.noise import smooth_level, squared_differences
 from frf_ipz.identification.search.arrivals import find_arrivals
 from frf_ipz.identification.search.delays import (
     CommonDelay,
@@ -39,7 +46,7 @@ from frf_ipz.identification.search.delays import (
 from frf_ipz.identification.search.discrepancy import with_discrepancy
 from frf_ipz.identification.search.drift import Drift
 from frf_ipz.identification.search.force_error import ForceError
-from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit, peak_levels
+from frf_ipz.identification.search.goodness_of_fit import LEVEL_SCATTER, GoodnessOfFit, assess_fit, peak_levels
 from frf_ipz.identification.search.selection import (
     ROUGH_ITERATIONS,
     SelectedModes,
@@ -466,10 +473,13 @@ def _refine_with_final_weights(
     misfit_ratio, noise, noise_from = misfit_over_noise(goodness, fit), lines.variance, "recordings"
     if model_limits or not lines.known.all() or np.median(misfit_ratio) > MODEL_ERROR:
         noise_from = "misfit"
-        lines = replace(lines, variance=lines.variance * goodness.level)
-        assessed = fit.poles
-        fit = refine_poles(replace(lines.weighted(), real_modes=data.real_modes), assessed, terms)
+        lower = _variance_below_model_error(lines, goodness, fit)
+        lines = replace(lines, variance=np.where(np.isfinite(lower), lower, lines.variance * goodness.level))
+        assessed, weighed = fit.poles, replace(lines.weighted(), real_modes=data.real_modes)
+        fit = refine_poles(weighed, assessed, terms)
         goodness = goodness.of_poles(assessed, fit.poles)
+        if np.isfinite(lower).any():  # correlation shows in what is left over its own size
+            goodness = replace(goodness, candidates=assess_fit(weighed, fit, terms).candidates)
     return FittedModes(
         lines=lines,
         terms=terms,
@@ -484,6 +494,24 @@ def _refine_with_final_weights(
         decisions=decisions,
         delay_s=delay_s,
     )
+
+
+def _variance_below_model_error(lines: MeasuredLines, goodness: GoodnessOfFit, fit: RefinedPoles) -> FloatArray:
+    """Give the mean square of the misfit where the noise is not known and it is clearly less than expected; else NaN.
+
+    The search takes no structure for better than linear to a part in a thousand; the fit shows that this one is.
+    """
+    n_lines, n_frfs = goodness.misfit.shape
+    spare = 1.0 - (fit.system.n_linear + 2 * fit.system.n_poles / n_frfs) / (2 * n_lines)
+    if lines.known.all() or spare < LEAST_SPARE:
+        return np.full((n_lines, n_frfs), np.nan)
+    level = smooth_level(np.abs(goodness.misfit) ** 2) / (2 * spare)
+    misfit = goodness.misfit / lines.weighted().weight
+    variance = misfit_square(lines, misfit) / spare
+    is_less = ~lines.known & (level < 1 / LEVEL_SCATTER)
+    on_peaks = is_less * np.abs(lines.receptance) / variance**1.5
+    differs = LEVEL_SCATTER * np.sum(on_peaks * squared_differences(misfit)) >= np.sum(on_peaks * np.abs(misfit) ** 2)
+    return np.where(is_less & differs, variance, np.nan)  # what is alike on neighbouring lines is no noise
 
 
 def variance_factors(fitted: FittedModes) -> FloatArray:

@@ -84,6 +84,7 @@ class _LabelEstimate:
     coherence: FloatArray
     count: int
     force_noise: ComplexArray | None
+    missing_force: ComplexArray | None
     force: int = 0
 
 
@@ -161,7 +162,16 @@ def _assemble_frfs(
         correlated_lines=correlated_lines(survey.decay_1_s * duration),
         unknown_scale=test.unknown_scale,
         force_noise=_force_noise(survey, ordered_estimates),
+        missing_force=_missing_force(ordered_estimates),
     )
+
+
+def _missing_force(estimates: Sequence[_LabelEstimate]) -> ComplexArray | None:
+    """Give what records lack of their forces, relative to what they hold; None where they lack nothing."""
+    columns = [estimate.missing_force for estimate in estimates if estimate.missing_force is not None]
+    if len(columns) < len(estimates) or not np.any(columns):
+        return None
+    return np.column_stack(columns)
 
 
 def _force_noise(survey: Survey, estimates: Sequence[_LabelEstimate]) -> ForceNoise | None:
@@ -220,7 +230,7 @@ def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str)
     sums, noise = average.sums, average.noise
     values = estimate_frf(sums, estimator)
     coherence = estimate_coherence(sums)
-    force_noise = None
+    force_noise = missing_force = None
     if noise is None:
         variance = frf_variance(sums, average.independent)
     else:
@@ -229,6 +239,8 @@ def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str)
             values = estimate_frf(replace(sums, force=np.where(own_power > 0.0, own_power, sums.force)))
         variance = impact_variance(sums, noise, values)
         force_noise = relative_force_noise(sums, noise, values, variance)
+        power = sums.force.T
+        missing_force = np.divide(noise.missing_force.T, power, out=np.zeros(values.shape, complex), where=power > 0.0)
     return {
         label: _LabelEstimate(
             values=values[:, column],
@@ -236,6 +248,7 @@ def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str)
             coherence=coherence[:, column],
             count=int(sums.counts[column]),
             force_noise=None if force_noise is None else force_noise[:, column],
+            missing_force=None if missing_force is None else missing_force[:, column],
         )
         for column, label in enumerate(labels)
         if sums.counts[column]

@@ -9,7 +9,7 @@ import numpy as np
 from frf_ipz.ingest.estimation.averaging import average_recordings
 from frf_ipz.ingest.estimation.impact_noise import empty_noise
 from frf_ipz.ingest.signals.decay import noise_power
-from frf_ipz.ingest.signals.windows import impact_windows
+from frf_ipz.ingest.signals.windows import exponential_window, impact_windows
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray
@@ -73,8 +73,11 @@ def _add_noise(noise: ImpactNoise, info: RecordInfo, record: Record, survey: Sur
     noise.scaled_force[rows] += scales * force**2
     noise.pulse[rows] += force * spectrum * np.exp(2j * np.pi * frequency_hz * record.trigger * record.step_s)
     if any(info.missing_force):
-        missing = force * np.abs(np.fft.rfft(info.missing_force, survey.n_samples))
-        first = slice(0, len(info.missing_force) + 1)
+        count = len(info.missing_force)
+        lost = info.missing_force * exponential_window(count, 1.0, rate, count + record.trigger)
+        earlier = np.exp(2j * np.pi * frequency_hz * count * record.step_s)
+        missing = spectrum.conj() * np.fft.rfft(lost, survey.n_samples) * earlier
+        first = slice(0, count + 1)
         sizes = np.linalg.norm(record.responses[:, first], axis=1)
         noise.missing_force[rows] += missing
-        noise.missing_response[rows] += missing * sizes[:, None] / np.linalg.norm(record.force[first])
+        noise.missing_response[rows] += np.abs(missing) * sizes[:, None] / np.linalg.norm(record.force[first])

@@ -55,8 +55,10 @@ class ImpactNoise:
         Squared modulus of the force times the relative noise power s of the impact.
     scales : (n_outputs, 1) array
         Relative noise powers s.
-    missing_force, missing_response : (n_outputs, n_lines) array
-        Modulus of the force times that of what its record lacks of it, and of the response.
+    missing_force : (n_outputs, n_lines) complex array
+        What the record lacks of the force, times the conjugate of what it holds.
+    missing_response : (n_outputs, n_lines) array
+        The same of the response, as moduli.
     pulse : (n_outputs, n_lines) complex array
         Transform of the force from its impact on, times its modulus.
     """
@@ -65,7 +67,7 @@ class ImpactNoise:
     force: FloatArray
     scaled_force: FloatArray
     scales: FloatArray
-    missing_force: FloatArray
+    missing_force: ComplexArray
     missing_response: FloatArray
     pulse: ComplexArray
 
@@ -101,9 +103,9 @@ def empty_noise(n_lines: int, n_outputs: int) -> ImpactNoise:
         Zeros.
     """
     lengths = {field.name: 1 if field.name == "scales" else n_lines for field in fields(ImpactNoise)}
-    del lengths["pulse"]
-    zeros = {name: np.zeros((n_outputs, length)) for name, length in lengths.items()}
-    return ImpactNoise(**zeros, pulse=np.zeros((n_outputs, n_lines), complex))
+    complex_sums = ("missing_force", "pulse")
+    zeros = {name: np.zeros((n_outputs, n), complex if name in complex_sums else float) for name, n in lengths.items()}
+    return ImpactNoise(**zeros)
 
 
 def add_noise(parts: Sequence[ImpactNoise]) -> ImpactNoise:
@@ -173,8 +175,9 @@ def impact_variance(sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray
         unexplained = np.where(sums.counts == 1, measured, scatter)
         unexplained += gain * (noise.force.T / counts) * (noise.force.T / power)
         variance = unexplained * power / own_power**2
-        variance += gain * (noise.missing_force / sums.force).T ** 2 + (noise.missing_response / sums.force).T ** 2
-        is_recorded = MOST_MISSING * power >= noise.missing_force.T
+        variance += gain * np.abs(noise.missing_force / sums.force).T ** 2
+        variance += (noise.missing_response / sums.force).T ** 2
+        is_recorded = MOST_MISSING * power >= np.abs(noise.missing_force).T
         is_recorded &= (noise.force.T > 0.0) | (power > LEAST_FORCE * power.max(axis=0))
     return np.asarray(np.where((own_power > 0.0) & _up_to_first_hole(is_recorded), variance, np.nan))
 

@@ -1,0 +1,79 @@
+"""Delays of impacts: what a record lacks of its force is none, and a deviation knows what the lines share."""
+
+import numpy as np
+import pytest
+
+from frf_ipz.identification.fit import fit_modes
+from frf_ipz.identification.options import FitOptions
+from frf_ipz.identification.search.find_modes import find_modes
+from frf_ipz.ingest.campaign import Recording, VibrationTest
+from frf_ipz.ingest.estimate import estimate_frfs
+from synthetic_campaign import Structure, pulse, respond
+
+RATE_HZ, N_SAMPLES = 2048.0, 4096
+MODES = Structure(
+    frequency_hz=(40.0, 97.0, 181.0, 330.0),
+    damping_ratio=(0.015, 0.01, 0.008, 0.008),
+    shapes=((1.0, 0.7, -0.5, 0.8), (0.6, -0.8, 0.9, 0.4)),
+)
+CALIBRATED = (0.5, 1.5)  # the bar of the project, 0.8 to 1.3, and what a dozen numbers scatter
+
+
+def impacts(seed, *, delay_s=0.0, begins_at=0.0, force_noise=5e-3, response_noise=5e-3, count=5):
+    """Give FRFs of impacts whose responses come late, and whose records begin at a part of the peak."""
+    rng = np.random.default_rng(seed)
+    records = []
+    for height in 100.0 * np.exp(0.3 * rng.standard_normal(count)):
+        at_s = 0.03 + rng.uniform() / RATE_HZ
+        force = pulse(N_SAMPLES, 1 / RATE_HZ, height=height, at_s=at_s)
+        late = pulse(N_SAMPLES, 1 / RATE_HZ, height=height, at_s=at_s + delay_s)
+        responses = respond(MODES, late, 1 / RATE_HZ)
+        signals = np.vstack([force, responses])
+        signals += np.array([[force_noise], [response_noise], [response_noise]]) * rng.standard_normal(signals.shape)
+        first = int(np.argmax(force > begins_at * height))
+        records.append(signals[:, first : first + N_SAMPLES - 100])
+    return estimate_frfs(
+        VibrationTest.from_recordings(
+            [
+                Recording(
+                    force=signals[0],
+                    responses=signals[1:],
+                    sample_rate_hz=RATE_HZ,
+                    input_dof="3:+z",
+                    output_dofs=["5:+z", "2:+z"],
+                )
+                for signals in records
+            ]
+        )
+    ).frfs
+
+
+def test_a_record_that_begins_in_the_pulse_is_not_late():
+    fit = fit_modes(impacts(1, begins_at=0.7))
+    assert not fit.model.delay_s.any()
+    assert not any(" ms (+- " in text for text in fit.warnings)
+
+
+def test_a_delay_is_as_uncertain_as_the_missing_part_of_the_pulse_makes_it():
+    delay = find_modes(impacts(1, begins_at=0.7, delay_s=1e-3), FitOptions()).common_delay
+    assert 0.5 * delay.std_s < abs(delay.delay_s - 1e-3) < 2 * delay.std_s
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [{"force_noise": 0.2}, {"response_noise": 0.05}], ids=["force", "response"])
+def test_the_deviation_knows_the_noise_that_lines_share(noise):
+    found = [find_modes(impacts(seed, delay_s=1e-3, **noise), FitOptions()).common_delay for seed in range(60, 72)]
+    errors = [(delay.delay_s - 1e-3) / delay.std_s for delay in found]
+    assert CALIBRATED[0] < np.sqrt(np.mean(np.square(errors))) < CALIBRATED[1]
+
+
+def test_what_a_record_lacks_of_its_force_is_how_much_too_large_frfs_are():
+    frfs = impacts(3, begins_at=0.3, force_noise=0.0, response_noise=0.0)
+    used = frfs.in_band((20.0, 200.0))
+    excess = frfs.values[used] / MODES.accelerance(frfs.s[used]) - 1
+    strong = np.abs(frfs.values[used]) > np.median(np.abs(frfs.values[used]))  # responses before the record count less
+    missing = frfs.missing_force[used][strong]
+    assert np.median(np.abs(excess[strong] - missing)) < 0.4 * np.median(np.abs(missing))
+    assert frfs.select_lines(used).missing_force.shape == frfs.values[used].shape
+    assert frfs.select_frfs([0]).missing_force.shape == (frfs.n_lines, 1)
+    assert impacts(3).missing_force is None
