@@ -11,7 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import io as io_matlab
 
+from frf_ipz.frf import FrfSet
 from frf_ipz.identification.fit import fit_modes
 from synthetic_frfs import accelerances, random_modes
 
@@ -19,6 +21,9 @@ MODES_HZ = np.geomspace(40.0, 950.0, 20)
 DAMPING_RATIO = 0.004
 EXPONENT = 1.2  # in FRFs: the bar of the project
 LONG_S = 30.0  # of one FRF of 500 000 lines, its noise unknown: the bar of the project
+MANY_FRFS_S = 2.0  # of 300 FRFs by 1000 lines by 20 modes, with covariance: the bar of the project
+GRID_S = 20.0  # of 10 FRFs by 16 385 lines of a grid of rulers: the bar of the project
+RULERS = "ruler_grid/ruler_grid_acc_3.mat"
 PEER_ORDER = 60
 
 
@@ -65,6 +70,28 @@ def test_one_long_record(benchmark):
     benchmark.extra_info.update(cpu_s=seconds)
     benchmark.pedantic(lambda: None, rounds=1)
     assert seconds < LONG_S
+
+
+def test_three_hundred_frfs(benchmark):
+    frfs = frfs_of(100, 3, 1000)
+    seconds = min(cpu_seconds(lambda: fit_modes(frfs)) for _ in range(3))
+    print(f"\nfit of 300 FRFs, 1000 lines, 20 modes: {seconds:.2f} CPU s")
+    benchmark.extra_info.update(cpu_s=seconds)
+    benchmark.pedantic(lambda: None, rounds=1)
+    assert seconds < MANY_FRFS_S
+
+
+def test_grid_of_rulers(benchmark, recordings):
+    recorded = io_matlab.loadmat(recordings / RULERS)
+    values = recorded["yspec"]
+    lines_hz = np.arange(len(values)) * float(recorded["freq"].item()) / (2 * (len(values) - 1))
+    outputs = [f"{number}:+z" for number in range(1, values.shape[1] + 1)]
+    frfs = FrfSet.from_arrays(lines_hz, values[:, :, None], outputs=outputs, inputs=["3:+z"])
+    seconds = cpu_seconds(lambda: fit_modes(frfs))
+    print(f"\nfit of {frfs.n_frfs} FRFs of {frfs.n_lines} lines, a grid of rulers: {seconds:.1f} CPU s")
+    benchmark.extra_info.update(cpu_s=seconds)
+    benchmark.pedantic(lambda: None, rounds=1)
+    assert seconds < GRID_S
 
 
 @pytest.mark.filterwarnings("ignore")  # of the peer

@@ -25,6 +25,25 @@ SHARED_SPREAD = 0.15  # rms relative deviation of weights from profile times gai
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WeighedSums:
+    """What the likelihood needs of weighted lines and smooth terms, whatever the poles are.
+
+    Parameters
+    ----------
+    sums : LineSums
+        The weighted lines, by intervals.
+    of_powers : (n_systems, n_powers, n) array
+        Products of the powers with powers and FRFs.
+    of_squares : (n_frfs,) array
+        Weighted sum of squares of each FRF.
+    """
+
+    sums: LineSums
+    of_powers: FloatArray
+    of_squares: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WeightedLines:
     """Receptances and the weights of their lines, as the likelihood takes them.
 
@@ -58,9 +77,7 @@ class WeightedLines:
     real_modes: bool = False
     force: IntArray | None = None
     force_noise: ForceNoise | None = None
-    sums: dict[tuple[tuple[int, ...], float], tuple[LineSums, FloatArray]] = field(
-        default_factory=dict, init=False, repr=False
-    )
+    sums: dict[tuple[tuple[int, ...], float], WeighedSums] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def is_shared(self) -> bool:
@@ -71,6 +88,12 @@ class WeightedLines:
     def weight(self) -> FloatArray:
         """Weight of each line and FRF, (n_lines, n_frfs) array."""
         return self.profile[:, None] * self.gain if self.full is None else self.full
+
+    def with_real_modes(self) -> WeightedLines:
+        """Take residues for those of normal modes; what the compression has made of the lines stays."""
+        normal = replace(self, real_modes=True)
+        normal.sums.update(self.sums)
+        return normal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -17,7 +17,7 @@ from frf_ipz.identification.likelihood.refinement import refine_poles
 from frf_ipz.identification.likelihood.smooth_terms import smooth_terms_of_band
 from frf_ipz.identification.measured_lines import SIGNAL, measured_lines
 from frf_ipz.identification.search.find_modes import FIXED_POLES
-from frf_ipz.identification.search.goodness_of_fit import assess_fit
+from frf_ipz.identification.search.goodness_of_fit import assess_fit, missing_poles
 from frf_ipz.identification.stabilization import find_start_poles
 from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
@@ -76,7 +76,7 @@ def find_peaks(frfs: FrfSet, options: FitOptions) -> FrfPeaks:
     data, terms = lines.weighted(shared=True), smooth_terms_of_band(lines.band_hz, lines.line_hz).first(FIXED_POLES)
     fit = refine_poles(data, start.poles, terms, iterations=0)
     if not len(fit.poles):  # short bands may give none: what stands out of the noise then begins as it does in the fit
-        fit = refine_poles(data, assess_fit(data, fit, terms).candidates[0].poles, terms)
+        fit = refine_poles(data, missing_poles(assess_fit(data, fit, terms))[0], terms)
     poles, residues = fit.poles, fit.system.residues()
     at = np.argmin(np.abs(lines.s.imag[:, None] - poles.imag), axis=0)  # the line next to each pole
     distance = np.abs(lines.s[at] - poles)[:, None]

@@ -19,6 +19,7 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.numerics.chebyshev import chebyshev_nodes, interpolation
 from frf_ipz.numerics.partial_fractions import pair_rows
 
 # seen from this many half lengths, m nodes leave (3 + sqrt(8))^-m: rounding
@@ -26,7 +27,7 @@ FAR = 3.0
 NODES = 18
 LINES_OF_SMALLEST = 128  # of the smallest intervals: fewer would cost more in calls than they save
 LINES_OF_TILE = 128  # at most
-ANGLES = (2 * np.arange(NODES) + 1) * np.pi / (2 * NODES)
+PLACES = chebyshev_nodes(NODES)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,14 +79,14 @@ class LineSums:
         levels: list[FloatArray] = []
         if depth:
             number = np.repeat(np.arange(count), np.diff(first))
-            weights = _interpolation(2 * ((s.imag - low) / length - number) - 1)
+            weights = interpolation(2 * ((s.imag - low) / length - number) - 1, NODES)
             at = (NODES * number[:, None] + np.arange(NODES)).ravel()
             to_nodes = sparse.csc_array(
                 (weights.ravel(), at, NODES * np.arange(len(s) + 1)), shape=(NODES * count, len(s))
             )
             nodes = [np.asarray(to_nodes @ part).reshape(count, NODES, -1) for part in (rows.real, rows.imag)]
             levels = [np.stack(nodes, axis=1)]
-            halves = [_interpolation((np.cos(ANGLES) + side) / 2).T for side in (-1, 1)]
+            halves = [interpolation((PLACES + side) / 2, NODES).T for side in (-1, 1)]
             while len(levels[-1]) > 1:
                 fine = levels[-1]
                 levels.append(halves[0] @ fine[::2] + halves[1] @ fine[1::2])
@@ -111,7 +112,7 @@ class LineSums:
             half = (high.imag - low.imag) / len(level) / 2
             middle = low + 1j * half * (2 * interval + 1)
             is_far = np.abs(poles[pole] - middle) > FAR * half
-            nodes = middle[is_far, None] + 1j * half * np.cos(ANGLES)
+            nodes = middle[is_far, None] + 1j * half * PLACES
             _add(total, pole[is_far], _columns(nodes, poles[pole[is_far]]), level[interval[is_far]])
             pole, interval = np.repeat(pole[~is_far], 2), np.repeat(2 * interval[~is_far], 2)
             interval[1::2] += 1
@@ -154,7 +155,7 @@ class LineSums:
             half = band / len(level) / 2
             middle = low + 1j * half * (2 * interval + 1)
             is_far = (np.abs(poles - middle[:, None]) > FAR * half).all(axis=1)
-            places.append((middle[is_far, None] + 1j * half * np.cos(ANGLES)).ravel())
+            places.append((middle[is_far, None] + 1j * half * PLACES).ravel())
             rows.append(level[interval[is_far]].transpose(0, 2, 1, 3).reshape(len(places[-1]), 2, level.shape[-1]))
             interval = (2 * interval[~is_far, None] + np.arange(2)).ravel()
         if self.levels:
@@ -191,18 +192,9 @@ def _ranges(first: IntArray, count: IntArray) -> IntArray:
     return np.arange(count.sum()) + np.repeat(first - np.cumsum(count) + count, count)
 
 
-def _interpolation(places: FloatArray) -> FloatArray:
-    """Values at places of the polynomials that are one at a node and zero at the others, (n_places, n_nodes)."""
-    order = np.arange(NODES)
-    at_places = np.cos(np.arccos(np.clip(places, -1, 1))[:, None] * order)
-    at_nodes = np.cos(order[:, None] * ANGLES) * np.where(order == 0, 1.0, 2.0)[:, None]
-    return np.asarray(at_places @ at_nodes / NODES)
-
-
 def _columns(s: ComplexArray, poles: ComplexArray) -> FloatArray:
     """Columns of each pole on lines of its own, (n_poles, 4, 2 n_lines)."""
-    rows = np.concatenate([pair_rows(s, poles, power) for power in (1, 2)])
-    return rows.transpose(1, 0, 2, 3).reshape(len(poles), 4, 2 * s.shape[1])
+    return pair_rows(s, poles, (1, 2)).reshape(len(poles), 4, 2 * s.shape[1])
 
 
 def _add(total: FloatArray, pole: IntArray, columns: FloatArray, charges: FloatArray) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 
+SLOPES = 2  # power of a fraction that is its derivative with respect to the pole
 AT_ONCE = 32768  # lines times poles whose intermediate results stay in the cache: the fastest of 2048 to 65536, nearly
 
 
@@ -64,10 +65,11 @@ def pair_columns(s: ComplexArray, p: ComplexArray, power: int = 1) -> FloatArray
     (2 n_lines, 2 n_poles) array
         First all columns of real parts, then all of imaginary parts.
     """
-    return pair_rows(s[None], p, power).reshape(2 * len(p), 2 * len(s)).T
+    rows = pair_rows(s[None], p, (power,))
+    return rows.swapaxes(0, 1).reshape(2 * len(p), 2 * len(s)).T
 
 
-def pair_rows(s: ComplexArray, p: ComplexArray, power: int = 1) -> FloatArray:
+def pair_rows(s: ComplexArray, p: ComplexArray, powers: tuple[int, ...]) -> FloatArray:
     """Give the columns of `pair_columns` as rows, each pole on lines of its own.
 
     Parameters
@@ -76,19 +78,19 @@ def pair_rows(s: ComplexArray, p: ComplexArray, power: int = 1) -> FloatArray:
         Where the response is evaluated: lines of each pole, or of all.
     p : (n_poles,) complex array
         One pole of each conjugate pair, in the unit of `s`.
-    power : int
-        1 for the response itself; 2 for its derivative with respect to the poles.
+    powers : tuple of int
+        1 for the response itself, 2 for its derivative with respect to the poles.
 
     Returns
     -------
-    (2, n_poles, 2, n_lines) array
-        For real and imaginary parts of residues; real and imaginary parts of the response.
+    (n_poles, 2 n_powers, 2, n_lines) array
+        For real and imaginary parts of residues, of each power in turn; real and imaginary parts of the response.
     """
-    rows = np.empty((2, len(p), 2, s.shape[1]))
+    rows = np.empty((len(p), 2 * len(powers), 2, s.shape[1]))
     n_lines = -(-AT_ONCE // max(len(p), 1))
     for first in range(0, s.shape[1], n_lines):
         part = slice(first, first + n_lines)
-        _fill_rows(rows[..., part], s[:, part], p, power)
+        _fill_rows(rows[..., part], s[:, part], p, powers)
     return rows
 
 
@@ -113,25 +115,28 @@ def pair_products(p: ComplexArray, values: ComplexArray, slopes: ComplexArray, r
     (..., 4 n_poles, 4 n_poles) array
         Columns of real parts of residues, of imaginary parts, and of the slopes of both.
     """
-    both = np.concatenate([p, p.conj()])
+    both, n = np.concatenate([p, p.conj()]), len(p)
     inverse = 1 / (both + both.conj()[:, None] - 2 * real_part)
     sums = (values[..., None, :] + values.conj()[..., :, None]) * inverse
-    after, before = slopes[..., None, :], slopes.conj()[..., :, None]
-    n = len(p)
-    products = np.empty((*values.shape[:-1], 2, 2, n, 2, 2, n))
-    for row, column, block in (
-        (0, 0, -sums),
-        (0, 1, (sums - after) * inverse),
-        (1, 0, (sums - before) * inverse),
-        (1, 1, (after + before - 2 * sums) * inverse**2),
-    ):
-        a, b, c, d = block[..., :n, :n], block[..., :n, n:], block[..., n:, :n], block[..., n:, n:]
-        part = products[..., row, :, :, column, :, :]
-        part[..., 0, :, 0, :] = (a + b + c + d).real
-        part[..., 0, :, 1, :] = -(a - b + c - d).imag
-        part[..., 1, :, 0, :] = (a + b - c - d).imag
-        part[..., 1, :, 1, :] = (a - b - c + d).real
-    return products.reshape(*values.shape[:-1], 4 * n, 4 * n)
+    mixed = (sums - slopes[..., None, :]) * inverse
+    products = np.empty((*values.shape[:-1], 4 * n, 4 * n))
+    _fill_products(products[..., : 2 * n, : 2 * n], -sums)
+    _fill_products(products[..., : 2 * n, 2 * n :], mixed)
+    products[..., 2 * n :, : 2 * n] = products[..., : 2 * n, 2 * n :].swapaxes(-1, -2)
+    _fill_products(products[..., 2 * n :, 2 * n :], -(mixed + mixed.conj().swapaxes(-1, -2)) * inverse)
+    return products
+
+
+def _fill_products(products: FloatArray, block: ComplexArray) -> None:
+    """Turn products of the fractions of poles and conjugates into those of the columns of residues."""
+    n = block.shape[-1] // 2
+    (a, b), (c, d) = ((block[..., rows, :n], block[..., rows, n:]) for rows in (slice(n), slice(n, None)))
+    alike, crossed = a.real + d.real, b.real + c.real
+    alike_imag, crossed_imag = a.imag - d.imag, b.imag - c.imag
+    np.add(alike, crossed, out=products[..., :n, :n])
+    np.subtract(alike, crossed, out=products[..., n:, n:])
+    np.subtract(crossed_imag, alike_imag, out=products[..., :n, n:])
+    np.add(crossed_imag, alike_imag, out=products[..., n:, :n])
 
 
 def pair_error_growth(p: ComplexArray, values: ComplexArray, slopes: ComplexArray, real_part: float) -> FloatArray:
@@ -181,16 +186,20 @@ def pair_values(s: ComplexArray, p: ComplexArray, residues: ComplexArray) -> Com
     return np.asarray((1.0 / (s[:, None] - p)) @ residues + (1.0 / (s[:, None] - p.conj())) @ residues.conj())
 
 
-def _fill_rows(rows: FloatArray, s: ComplexArray, p: ComplexArray, power: int) -> None:
+def _fill_rows(rows: FloatArray, s: ComplexArray, p: ComplexArray, powers: tuple[int, ...]) -> None:
     # 1 / (s - p) is (a - i d) / (a^2 + d^2): real numbers, line after line in memory, take a fraction of the time
     a, d, e = s.real - p.real[:, None], s.imag - p.imag[:, None], s.imag + p.imag[:, None]
     upper, lower = 1.0 / (a * a + d * d), 1.0 / (a * a + e * e)
-    if power == 1:
-        upper_real, upper_imag, lower_real, lower_imag = a * upper, d * upper, a * lower, e * lower
-    else:
-        upper_real, lower_real = (a - d) * (a + d) * upper * upper, (a - e) * (a + e) * lower * lower
-        upper_imag, lower_imag = 2 * a * d * upper * upper, 2 * a * e * lower * lower
-    np.add(upper_real, lower_real, out=rows[0, :, 0])
-    np.negative(upper_imag + lower_imag, out=rows[0, :, 1])
-    np.subtract(upper_imag, lower_imag, out=rows[1, :, 0])
-    np.subtract(upper_real, lower_real, out=rows[1, :, 1])
+    upper_real, upper_imag, lower_real, lower_imag = a * upper, d * upper, a * lower, e * lower
+    for number, power in enumerate(powers):
+        if power == SLOPES:
+            upper_real, upper_imag = _squared(upper_real, upper_imag)
+            lower_real, lower_imag = _squared(lower_real, lower_imag)
+        np.add(upper_real, lower_real, out=rows[:, 2 * number, 0])
+        np.negative(upper_imag + lower_imag, out=rows[:, 2 * number, 1])
+        np.subtract(upper_imag, lower_imag, out=rows[:, 2 * number + 1, 0])
+        np.subtract(upper_real, lower_real, out=rows[:, 2 * number + 1, 1])
+
+
+def _squared(real: FloatArray, imag: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return (real - imag) * (real + imag), 2 * real * imag

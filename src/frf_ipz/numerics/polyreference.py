@@ -20,8 +20,11 @@ from scipy import linalg
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import IllConditionedError
+from frf_ipz.numerics.chebyshev import chebyshev_nodes, interpolation, nodes_for_waves
 
 LINES_AT_ONCE = 4096  # whose intermediate results stay in the cache
+PHASE = 4.0  # of the highest wave at the ends of an interval: 2 to 8 take about the same time
+ROUNDING = 1e-15  # of a wave between nodes
 RIDGE = 1e-13  # of the mean diagonal: far above rounding, far below what moves a pole that the data show
 
 
@@ -129,6 +132,7 @@ def participation(D: ComplexArray, z: ComplexArray) -> ComplexArray:
 
 def _moments(theta: FloatArray, columns: ComplexArray, order: int, *, real: bool) -> ComplexArray:
     """Sum over lines of each column times exp(-i theta m), for m from -order to order."""
+    theta, columns = _carried_to_nodes(theta, columns, order)
     even, odd, even_imag, odd_imag = np.zeros((4, order + 1, columns.shape[1]))
     for first in range(0, len(theta), LINES_AT_ONCE):
         part = slice(first, first + LINES_AT_ONCE)
@@ -146,6 +150,25 @@ def _moments(theta: FloatArray, columns: ComplexArray, order: int, *, real: bool
     positive = even + odd + 1j * (even_imag - odd_imag)
     negative = even - odd + 1j * (even_imag + odd_imag)
     return np.asarray(np.concatenate([negative[:0:-1], positive]))
+
+
+def _carried_to_nodes(theta: FloatArray, columns: ComplexArray, order: int) -> tuple[FloatArray, ComplexArray]:
+    """Give the few angles at which waves up to an order make the same sums to rounding as over all lines."""
+    half = float(theta[-1] - theta[0]) / 2
+    count = max(1, int(np.ceil(order * half / PHASE)))
+    n_nodes = nodes_for_waves(order * half / count, ROUNDING)
+    if count * n_nodes >= len(theta):
+        return theta, columns
+    edges = theta[0] + 2 * half / count * np.arange(count + 1)
+    middles = (edges[1:] + edges[:-1]) / 2
+    first = np.concatenate([[0], np.searchsorted(theta, edges[1:-1]), [len(theta)]])
+    carried = np.empty((count, n_nodes, columns.shape[1]), complex)
+    for number, middle in enumerate(middles.tolist()):
+        lines = slice(first[number], first[number + 1])
+        weights = interpolation((theta[lines] - middle) * count / half, n_nodes)
+        carried[number] = weights.T @ columns[lines]
+    angles = middles[:, None] + half / count * chebyshev_nodes(n_nodes)
+    return angles.ravel(), carried.reshape(len(angles) * n_nodes, -1)
 
 
 def _with_ridge(matrix: ComplexArray) -> ComplexArray:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy import linalg
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from frf_ipz.identification.measured_lines import WeighedSums
 from frf_ipz.numerics.line_sums import LineSums
 from frf_ipz.numerics.partial_fractions import (
     pair_columns,
@@ -22,7 +23,6 @@ from frf_ipz.numerics.partial_fractions import (
     pair_products,
     pair_rows,
     stacked,
-    unstacked,
 )
 
 if TYPE_CHECKING:
@@ -152,14 +152,15 @@ def compress(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) -> Co
         real_modes=data.real_modes,
         U=np.stack([U for U, _ in reduced]),
         z=np.concatenate([z.T for _, z in reduced]),
-        total=np.sum(np.abs(data.receptance * data.weight) ** 2, axis=0),
+        total=_line_sums(data, terms).of_squares,
         scale=data.gain if data.is_shared else np.ones(data.receptance.shape[1]),
     )
 
 
 def _normal_equations(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) -> tuple[FloatArray, FloatArray]:
     """Give the products of the weighted columns with one another and with the FRFs: of all together, or of each."""
-    sums, of_powers = _line_sums(data, terms)
+    weighed = _line_sums(data, terms)
+    sums, of_powers = weighed.sums, weighed.of_powers
     every = np.concatenate([terms.poles, poles])
     n_powers, n_systems, n = len(terms.powers), len(of_powers), len(every)
     products = sums.products(every)
@@ -177,8 +178,7 @@ def _normal_equations(data: WeightedLines, poles: ComplexArray, terms: SmoothTer
     lossy = np.flatnonzero(growth > MOST_GROWTH)
     if len(lossy):  # narrow for the lines, or where lines weigh far less than others
         s, weights = sums.seen_from(every[lossy])
-        rows = np.concatenate([pair_rows(s[None], every[lossy], power) for power in (1, 2)])
-        rows = rows.reshape(4 * len(lossy), 2 * len(s))
+        rows = pair_rows(s[None], every[lossy], (1, 2)).swapaxes(0, 1).reshape(4 * len(lossy), 2 * len(s))
         places = (n_powers + n * np.arange(4)[:, None] + lossy).ravel()
         for system, squares in zip(gram, weights[:, 0, : n_shared : 2 + n_powers].T, strict=True):
             system[np.ix_(places, places)] = (rows * np.tile(squares, 2)) @ rows.T
@@ -208,8 +208,8 @@ def _column_order(n_powers: int, n_fixed: int, n: int, *, real_modes: bool) -> I
     )
 
 
-def _line_sums(data: WeightedLines, terms: SmoothTerms) -> tuple[LineSums, FloatArray]:
-    """Intervals of the weighted lines, and the products of the powers with powers and FRFs."""
+def _line_sums(data: WeightedLines, terms: SmoothTerms) -> WeighedSums:
+    """Give what does not depend on the poles; it is made once for lines and terms."""
     key = terms.powers, terms.scale_rad_s
     if key not in data.sums:
         profiles = _profiles(data)
@@ -221,7 +221,11 @@ def _line_sums(data: WeightedLines, terms: SmoothTerms) -> tuple[LineSums, Float
         with_powers = np.concatenate([of_systems[:, :, 2:], sides], axis=2)
         of_powers = np.einsum("lp,lgr->gpr", powers.conj(), with_powers).real
         weighted = np.concatenate([of_systems.reshape(len(frfs), -1), frfs], axis=1)
-        data.sums[key] = LineSums.of_lines(data.s, weighted), of_powers
+        data.sums[key] = WeighedSums(
+            sums=LineSums.of_lines(data.s, weighted),
+            of_powers=of_powers,
+            of_squares=np.sum(np.abs(data.receptance * data.weight) ** 2, axis=0),
+        )
     return data.sums[key]
 
 
@@ -285,12 +289,17 @@ def response(system: CompressedSystem, terms: SmoothTerms, s: ComplexArray) -> C
     (n, n_frfs) complex array
         Receptances, m/N.
     """
-    coefficients = system.coefficients().T
-    values = np.empty((len(s), coefficients.shape[1]), complex)
+    coefficients, n_powers = system.coefficients(), len(terms.powers)
+    poles = np.concatenate([terms.poles, system.poles])
+    # real and imaginary part of each residue in turn
+    residues = np.ascontiguousarray(system.residues().T).view(float)
+    of_poles = np.concatenate([coefficients[:, n_powers : terms.n_columns], residues], axis=1)
+    values = np.empty((len(s), len(coefficients)), complex)
     for first in range(0, len(s), LINES_AT_ONCE):
         lines = slice(first, first + LINES_AT_ONCE)
-        columns = model_columns(s[lines], system.poles, terms, real_modes=system.real_modes)
-        values[lines] = unstacked(columns @ coefficients)
+        parts = of_poles @ pair_rows(s[None, lines], poles, (1,)).reshape(2 * len(poles), -1)
+        real, imag = np.split(parts, 2, axis=1)
+        values[lines] = (real + 1j * imag).T + terms.powers_of(s[lines]) @ coefficients[:, :n_powers].T
     return values
 
 
@@ -310,12 +319,17 @@ def column_gains(system: CompressedSystem, groups: list[list[int]]) -> FloatArra
         Increase of minus twice the log likelihood where those of a group are zero, the poles being held.
     """
     n, coefficients = system.n_linear, system.scaled_coefficients()
-    inverses = np.stack([linalg.solve_triangular(U[:n, :n], np.eye(n), check_finite=False) for U in system.U])
+    asked = np.unique(np.array([column for columns in groups for column in columns], np.int64))
+    units = np.eye(n)[:, asked]
+    inverses = np.stack([linalg.solve_triangular(U[:n, :n], units, trans="T", check_finite=False).T for U in system.U])
     gains = np.empty((len(groups), len(coefficients)))
-    for number, columns in enumerate(groups):
-        c, rows = coefficients[:, columns], inverses[:, columns]
-        weight = np.linalg.inv(rows @ rows.transpose(0, 2, 1))
-        gains[number] = np.einsum("fi,fij,fj->f", c, np.broadcast_to(weight, (len(c), *weight.shape[1:])), c)
+    sizes = np.array([len(columns) for columns in groups], np.int64)
+    for size in np.unique(sizes).tolist():
+        numbers = np.flatnonzero(sizes == size)
+        columns = np.array([groups[number] for number in numbers.tolist()], np.int64)
+        c, rows = coefficients[:, columns], inverses[:, np.searchsorted(asked, columns)]
+        weight = np.linalg.inv(rows @ rows.swapaxes(2, 3))
+        gains[numbers] = np.einsum("fgi,fgij,fgj->gf", c, np.broadcast_to(weight, (len(c), *weight.shape[1:])), c)
     return gains
 
 

@@ -22,10 +22,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
+from scipy import linalg, sparse
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
-from frf_ipz.identification.likelihood.compression import model_columns, response
+from frf_ipz.identification.likelihood.compression import LINES_AT_ONCE, model_columns, response
 from frf_ipz.identification.measured_lines import MeasuredLines, WeightedLines
 from frf_ipz.numerics.partial_fractions import stacked
 
@@ -59,18 +59,17 @@ def pole_variance_factors(data: WeightedLines, fit: RefinedPoles, terms: SmoothT
     (2 n_poles,) array
         For all real parts, then all imaginary parts; about 1 where the misfit is white noise of the stated size.
     """
-    scores = _scores(data, fit, terms)
     inverse = np.linalg.pinv(fit.information, hermitian=True)
-    expected = np.diag(inverse)
-    variances = [np.einsum("ij,jk,ki->i", inverse, _score_covariance(scores, max_lag), inverse) for max_lag in LAGS]
-    return np.asarray(np.max(variances, axis=0) / expected)
+    errors = _scores(data, fit, terms) @ inverse  # of the poles, by each line
+    variances = [_variance(errors, max_lag) for max_lag in LAGS]
+    return np.asarray(np.max(variances, axis=0) / np.diag(inverse))
 
 
-def _score_covariance(scores: FloatArray, max_lag: int) -> FloatArray:
-    total = scores.T @ scores
+def _variance(errors: FloatArray, max_lag: int) -> FloatArray:
+    """Variance of the sum of errors, those of neighbouring lines being correlated."""
+    total = np.einsum("lk,lk->k", errors, errors)
     for lag in range(1, max_lag + 1):
-        shifted = scores[lag:].T @ scores[:-lag]
-        total += (1 - lag / (max_lag + 1)) * (shifted + shifted.T)
+        total += 2 * (1 - lag / (max_lag + 1)) * np.einsum("lk,lk->k", errors[lag:], errors[:-lag])
     return np.asarray(total)
 
 
@@ -109,7 +108,7 @@ def shared_noise_factors(
     if noise is not None:
         of_force = NoiseInTime.within(lines.frequency_hz, noise.interval_s)
         error = error * np.exp(-2j * np.pi * lines.frequency_hz * np.mean(noise.interval_s))[:, None]
-    for frfs, slopes in _pole_slopes(data, fit, terms):
+    for frfs, slopes in _pole_slopes(data, fit, terms, slice(None)):
         for frf in frfs.tolist():
             samples = of_response(slopes.scores(own[:, [frf]], residues[[frf]]))
             covariance += samples.T @ samples
@@ -224,17 +223,17 @@ def _grid(places: FloatArray) -> sparse.csr_array:
 
 def _scores(data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms) -> FloatArray:
     """Gradient of the log likelihood by the poles on each line, (n_lines, 2 n_poles), all FRFs together."""
-    system = fit.system
-    n_lines, n_poles = len(data.s), system.n_poles
-    misfit = stacked((data.receptance - response(system, terms, data.s)) * data.weight)
-    residues = system.scaled_residues()
-    scores = np.zeros((n_lines, 2 * n_poles))
-    for frfs, slopes in _pole_slopes(data, fit, terms):
-        real, imag = slopes.real, slopes.imag
-        corrected = misfit[:, frfs] / np.sqrt(1 - slopes.leverage)[:, None]
-        a, b = corrected @ residues[frfs].real, corrected @ residues[frfs].imag
-        by_poles = np.concatenate([real * a + imag * b, imag * a - real * b], axis=1)
-        scores += by_poles[:n_lines] + by_poles[n_lines:]
+    misfit = (data.receptance - response(fit.system, terms, data.s)) * data.weight
+    residues = fit.system.scaled_residues()
+    scores = np.zeros((len(data.s), 2 * fit.system.n_poles))
+    for first in range(0, len(data.s), LINES_AT_ONCE):
+        lines = slice(first, first + LINES_AT_ONCE)
+        of_lines, stacked_misfit = scores[lines], stacked(misfit[lines])
+        for frfs, slopes in _pole_slopes(data, fit, terms, lines):
+            corrected = stacked_misfit[:, frfs] / np.sqrt(1 - slopes.leverage)[:, None]
+            a, b = corrected @ residues[frfs].real, corrected @ residues[frfs].imag
+            by_poles = np.concatenate([slopes.real * a + slopes.imag * b, slopes.imag * a - slopes.real * b], axis=1)
+            of_lines += by_poles[: len(of_lines)] + by_poles[len(of_lines) :]
     return scores
 
 
@@ -266,15 +265,20 @@ def _complex(parts: FloatArray) -> ComplexArray:
     return np.asarray(real + 1j * imag)
 
 
-def _pole_slopes(data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms) -> Iterator[tuple[IntArray, _PoleSlopes]]:
-    """Give FRFs with a common basis, and their slopes."""
-    system = fit.system
-    columns = model_columns(data.s, fit.poles, terms, real_modes=system.real_modes, with_slopes=True)
-    for number, weight in enumerate([data.profile] if data.is_shared else data.weight.T):
+def _pole_slopes(
+    data: WeightedLines, fit: RefinedPoles, terms: SmoothTerms, lines: slice
+) -> Iterator[tuple[IntArray, _PoleSlopes]]:
+    """Give FRFs with a common basis, and their slopes on some lines.
+
+    The basis is that of the compressed system, ``B = Q U``: an orthonormal one need not be made anew.
+    """
+    system, n = fit.system, fit.system.n_linear
+    columns = model_columns(data.s[lines], fit.poles, terms, real_modes=system.real_modes, with_slopes=True)
+    weights = data.profile[lines, None] if data.is_shared else data.weight[lines]
+    for number, (U, weight) in enumerate(zip(system.U, weights.T, strict=True)):
         frfs = np.arange(data.receptance.shape[1]) if data.is_shared else np.array([number])
         weighted = columns * np.tile(weight, 2)[:, None]
-        basis = np.linalg.qr(weighted[:, : system.n_linear])[0]
-        slopes = weighted[:, system.n_linear :]
-        real, imag = np.split(slopes - basis @ (basis.T @ slopes), 2, axis=1)
-        leverage = np.minimum(np.einsum("ij,ij->i", basis, basis), MAX_LEVERAGE)
+        basis = linalg.solve_triangular(U[:n, :n], weighted[:, :n].T, trans="T", check_finite=False)
+        real, imag = np.split(weighted[:, n:] - basis.T @ U[:n, n:], 2, axis=1)
+        leverage = np.minimum(np.einsum("ij,ij->j", basis, basis), MAX_LEVERAGE)
         yield frfs, _PoleSlopes(real=real, imag=imag, leverage=leverage)

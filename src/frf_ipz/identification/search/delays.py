@@ -76,7 +76,7 @@ def each_delay(
     delays = np.zeros(len(labels))
     for _ in range(ROUNDS):
         poles = find_poles(lines.advanced(delays))
-        delays = find_delays(_normal(lines), poles, terms, numbers)
+        delays, _ = find_delays(_normal(lines), poles, terms, numbers)
     return delays
 
 
@@ -102,8 +102,9 @@ def explains_misfit(labels: Sequence[FrfLabel], lines: MeasuredLines, poles: Com
     numbers = _channel_numbers(labels)
     if not numbers.any():
         return False
-    delays = find_delays(_normal(lines), poles, terms, numbers)
-    data, late = (replace(_normal(at), real_modes=False) for at in (lines, lines.advanced(delays)))
+    data = lines.weighted(shared=True)
+    delays, _ = find_delays(data.with_real_modes(), poles, terms, numbers)
+    late = lines.advanced(delays).weighted(shared=True)
     return _misfit(late, poles, terms) < MOST * _misfit(data, poles, terms)
 
 
@@ -138,21 +139,21 @@ def common_delay(
     """
     n_frfs = lines.receptance.shape[1]
     one_channel = np.zeros(n_frfs, np.int64)
-    normal, noise = _normal(lines), 2.0 * lines.receptance.size
+    complex_modes, noise = lines.weighted(shared=True), 2.0 * lines.receptance.size
+    normal = complex_modes.with_real_modes()
     left = _misfit(normal, poles, terms)
     by_number = float(np.log(2 * len(lines.s)))  # demanded by the BIC for each number more
-    if left - _misfit(replace(normal, real_modes=False), poles, terms) < len(poles) * n_frfs * by_number:
+    if left - _misfit(complex_modes, poles, terms) < len(poles) * n_frfs * by_number:
         return None  # modes are normal
     delay = 0.0
     for _ in range(ROUNDS):
-        delay = float(find_delays(normal, poles, terms, one_channel)[0])
-        late = _normal(lines.advanced(np.full(n_frfs, delay)))
-        gain = left - _misfit(late, poles, terms)
+        delays, misfit = find_delays(normal, poles, terms, one_channel)
+        delay, gain = float(delays[0]), left - misfit
         if gain < by_number or gain < MOST * (left - noise):
             return None
         poles = find_poles(lines.advanced(np.full(n_frfs, delay)))
-    late = _normal(lines.advanced(np.full(n_frfs, delay)))
-    if len(poles) < FEWEST_MODES or not _turns_most_modes(normal, late, poles, terms):
+    late = lines.advanced(np.full(n_frfs, delay)).weighted(shared=True)
+    if len(poles) < FEWEST_MODES or not _turns_most_modes(complex_modes, late, poles, terms):
         return None
     measured = measure_delay(lines, poles, terms, delay)
     return measured if measured.delay_s**2 > by_number * measured.std_s**2 else None
@@ -223,35 +224,12 @@ def _by_missing_force(late: MeasuredLines, poles: ComplexArray, terms: SmoothTer
     if late.missing_force is None:
         return 0.0
     whole = replace(late, receptance=late.receptance / (1 + late.missing_force))
-    return float(np.ptp([delay_of_normal_modes(lines, poles, terms)[0] for lines in (late, whole)]))
-
-
-def delay_of_normal_modes(lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms) -> tuple[float, float]:
-    """Find the delay that suits normal modes best, and what they leave then.
-
-    Parameters
-    ----------
-    lines : MeasuredLines
-        Lines and weights.
-    poles : (n_poles,) complex array
-        Poles, rad/s.
-    terms : SmoothTerms
-        Terms for modes out of band.
-
-    Returns
-    -------
-    delay_s : float
-        s.
-    misfit : float
-        Sum of squares over the noise.
-    """
-    n_frfs = lines.receptance.shape[1]
-    delays_s = find_delays(_normal(lines), poles, terms, np.zeros(n_frfs, np.int64))
-    return float(delays_s[0]), _misfit(_normal(lines.advanced(delays_s)), poles, terms)
+    one_channel = np.zeros(late.receptance.shape[1], np.int64)
+    return float(np.ptp([find_delays(_normal(lines), poles, terms, one_channel)[0][0] for lines in (late, whole)]))
 
 
 def _normal(lines: MeasuredLines) -> WeightedLines:
-    return replace(lines.weighted(shared=True), real_modes=True)
+    return lines.weighted(shared=True).with_real_modes()
 
 
 def _misfit(data: WeightedLines, poles: ComplexArray, terms: SmoothTerms) -> float:
@@ -262,7 +240,7 @@ def _turns_most_modes(before: WeightedLines, after: WeightedLines, poles: Comple
     """Check that the residues of most modes have less of a real part with the delay."""
     gains = []
     for data in (before, after):
-        system = compress(replace(data, real_modes=False), poles, terms)
+        system = compress(data, poles, terms)
         real_parts = [[system.n_smooth + number] for number in range(len(poles))]
         gains.append(column_gains(system, real_parts).sum(axis=1))
     return bool(np.count_nonzero(gains[1] < MOST * gains[0]) > MOST * len(poles))

@@ -23,6 +23,7 @@ from frf_ipz.identification.likelihood.compression import (
     response,
     solve_upper,
 )
+from frf_ipz.identification.likelihood.delay import find_delays
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
 from frf_ipz.identification.likelihood.sandwich import pole_variance_factors
 from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms, smooth_terms_of_band
@@ -38,7 +39,6 @@ from frf_ipz.identification.search.arrivals import find_arrivals
 from frf_ipz.identification.search.delays import (
     CommonDelay,
     common_delay,
-    delay_of_normal_modes,
     each_delay,
     explains_misfit,
     measure_delay,
@@ -221,9 +221,10 @@ def _first_delay(frfs: FrfSet, lines: MeasuredLines, first_s: float, options: Fi
     if not len(start.poles):
         return first_s, float("inf")
     terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(FIXED_POLES)
-    fit = refine_poles(advanced.weighted(shared=True), start.poles, terms, iterations=ROUGH_ITERATIONS)
-    more_s, misfit = delay_of_normal_modes(advanced, fit.poles, terms)
-    return first_s + more_s, misfit
+    data = advanced.weighted(shared=True)
+    fit = refine_poles(data, start.poles, terms, iterations=ROUGH_ITERATIONS)
+    delays_s, misfit = find_delays(data.with_real_modes(), fit.poles, terms, np.zeros(frfs.n_frfs, np.int64))
+    return first_s + float(delays_s[0]), misfit
 
 
 def _fit_from(frfs: FrfSet, first_s: float, options: FitOptions) -> FittedModes | None:
@@ -532,7 +533,7 @@ def variance_factors(fitted: FittedModes) -> FloatArray:
         return np.ones(2 * len(poles))
     data = fitted.lines.weighted()
     misfit = (data.receptance - response(fitted.fit.system, fitted.terms, data.s)) * data.weight
-    at_peaks = np.maximum(fitted.goodness.candidates[-1].level_at(poles), peak_levels(data, fitted.fit, misfit))
+    at_peaks = np.maximum(fitted.goodness.candidates.level_at(poles), peak_levels(data, fitted.fit, misfit))
     return np.asarray(np.maximum(np.tile(at_peaks, 2), pole_variance_factors(data, fitted.fit, fitted.terms)))
 
 

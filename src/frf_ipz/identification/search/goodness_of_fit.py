@@ -21,6 +21,8 @@ from frf_ipz.identification.search.candidates import Candidates, find_candidates
 from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from scipy.optimize import linear_sum_assignment
 
     from frf_ipz.identification.likelihood.refinement import RefinedPoles
@@ -46,8 +48,8 @@ class GoodnessOfFit:
         Measured minus model; each part has variance one where it is noise.
     level : (n_lines, n_frfs) array
         Mean square of the misfit over that of noise, at least 1.
-    candidates : tuple of Candidates
-        Poles that may be missing, from the misfit as it is and from that over its level.
+    candidates : Candidates
+        Poles that may be missing, from the misfit over its level.
     significance : (n_poles,) array
         What each pole takes off minus twice the log likelihood, over what the BIC demands for it.
     damping_std : (n_poles,) array
@@ -64,7 +66,7 @@ class GoodnessOfFit:
     frequency_hz: FloatArray
     misfit: ComplexArray
     level: FloatArray
-    candidates: tuple[Candidates, ...]
+    candidates: Candidates
     significance: FloatArray
     damping_std: FloatArray
     factor: FloatArray
@@ -122,10 +124,8 @@ def assess_fit(
     level = smooth_level(np.abs(misfit) ** 2) / 2
     level = np.where(level > LEVEL_SCATTER, level, 1.0)
     frequency = data.s.imag / (2 * np.pi)
-    max_count = 2 + len(fit.poles) // GROWTH
-    over_level = find_candidates(frequency, misfit / np.sqrt(level), max_count)
-    candidates = (find_candidates(frequency, misfit, max_count), over_level) if (level > 1).any() else (over_level,)
-    model_error, correlation = (level, over_level) if best is None else (best.level, best.candidates[-1])
+    over_level = find_candidates(frequency, misfit / np.sqrt(level), _max_count(len(fit.poles)))
+    model_error, correlation = (level, over_level) if best is None else (best.level, best.candidates)
     factor = _level_at_poles(data, fit.poles, model_error) * correlation.level_at(fit.poles)[:, None]
     gains = pole_gains(fit.system)
     modes_are_missing = fit.misfit > FAR * 2 * data.receptance.size
@@ -133,7 +133,7 @@ def assess_fit(
         frequency_hz=frequency,
         misfit=misfit,
         level=level,
-        candidates=candidates,
+        candidates=over_level,
         significance=over_bic(gains / factor, 2 * len(data.s)),
         damping_std=_damping_std(fit) * np.sqrt(np.median(factor, axis=1)),
         factor=factor,
@@ -142,13 +142,39 @@ def assess_fit(
     )
 
 
-def pole_gains(system: CompressedSystem) -> FloatArray:
+def missing_poles(goodness: GoodnessOfFit) -> tuple[ComplexArray, ...]:
+    """Find the poles that may be missing in a fit.
+
+    Parameters
+    ----------
+    goodness : GoodnessOfFit
+        Of the fit.
+
+    Returns
+    -------
+    tuple of complex arrays
+        rad/s, the strongest first: from the misfit as it is, where it is above its level, and from that over its level.
+    """
+    over_level = goodness.candidates.poles
+    if not (goodness.level > 1).any():
+        return (over_level,)
+    max_count = _max_count(len(goodness.significance))
+    return find_candidates(goodness.frequency_hz, goodness.misfit, max_count).poles, over_level
+
+
+def _max_count(n_poles: int) -> int:
+    return 2 + n_poles // GROWTH
+
+
+def pole_gains(system: CompressedSystem, poles: Sequence[int] | None = None) -> FloatArray:
     """Find the part of each FRF's misfit that each pole takes off.
 
     Parameters
     ----------
     system : CompressedSystem
         The fit.
+    poles : sequence of int, optional
+        Which poles; all by default.
 
     Returns
     -------
@@ -157,7 +183,8 @@ def pole_gains(system: CompressedSystem) -> FloatArray:
     """
     first, count = system.n_smooth, system.n_poles
     both = range(1 if system.real_modes else 2)
-    return column_gains(system, [[first + pole + part * count for part in both] for pole in range(count)])
+    asked = range(count) if poles is None else poles
+    return column_gains(system, [[first + pole + part * count for part in both] for pole in asked])
 
 
 def peak_levels(data: WeightedLines, fit: RefinedPoles, misfit: ComplexArray) -> FloatArray:

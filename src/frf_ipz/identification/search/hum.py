@@ -84,8 +84,8 @@ def _tail_significance(
     n_outside = int(np.count_nonzero(~inside))
     if not inside.any() or 2 * n_outside <= fit.system.U.shape[1]:
         return np.inf
-    gains = pole_gains(without_lines(fit.system, data, terms, inside))
-    return float(over_bic(gains[[number]] / factor, 2 * n_outside)[0])
+    gains = pole_gains(without_lines(fit.system, data, terms, inside), [number])
+    return float(over_bic(gains / factor, 2 * n_outside)[0])
 
 
 def _has_width(number: int, gains: FloatArray, goodness: GoodnessOfFit, by_number: float) -> bool:

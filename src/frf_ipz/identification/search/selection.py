@@ -18,6 +18,7 @@ from frf_ipz.identification.search.goodness_of_fit import (
     GoodnessOfFit,
     assess_fit,
     demanded_by_bic,
+    missing_poles,
     over_bic,
 )
 from frf_ipz.identification.search.hum import find_hum
@@ -364,7 +365,7 @@ def _without_drift(search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit) 
 
 def _proposed_poles(search: _Search, goodness: GoodnessOfFit) -> ComplexArray:
     proposed: list[complex] = []
-    for pole in np.concatenate([candidates.poles for candidates in goodness.candidates]):
+    for pole in np.concatenate(missing_poles(goodness)):
         is_double = any(abs(known - pole) < NEAR_REFUSED * -pole.real for known in proposed)
         was_refused = any(
             abs(known.imag - pole.imag) < NEAR_REFUSED * max(-pole.real, -known.real) for known in search.refused
