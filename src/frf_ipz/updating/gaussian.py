@@ -384,34 +384,37 @@ def linearise(
     ends = tuple(np.cumsum([piece.shape[1] for piece in pieces]).tolist())
     joined = _rotated(*turned, *pieces, data[:, None])
     del pieces  # large
-    bases: tuple[FloatArray | None, ...] = (None,) * (len(ends) - 1)
-    sums: list[tuple[FloatArray, FloatArray]] = []
-    if combining:
-        total = _sum_of_products(joined, 1 / level)
-        columns = [slice(first, end) for first, end in pairwise(ends)]
-        stds = np.ones(len(columns)) if scales is None else scales
-        bases = tuple(_told(total[at, at] * std**2) for at, std in zip(columns, stds, strict=False))
-        if any(basis is not None for basis in bases):
-            combined = [
-                joined[:, at] if basis is None else joined[:, at] @ basis
-                for at, basis in zip(columns, bases, strict=True)
-            ]
-            joined = np.hstack([joined[:, : ends[0]], *combined, joined[:, -1:]])
-            ends = tuple(np.cumsum([ends[0], *(piece.shape[1] for piece in combined)]).tolist())
-            total = _combined(total, columns, bases)
-        if np.isfinite(total).all():
-            sums.append((1 / level, total))
-    return Linearised(
+    linear = Linearised(
         joined=joined,
         ends=ends,
-        bases=bases,
+        bases=(None,) * (len(ends) - 1),
         level=level,
         axes=turned[0],
         places=turned[1],
         slack=units,
         rounding=rounding,
-        sums=sums,
     )
+    return _with_combinations(linear, np.ones(len(ends) - 1) if scales is None else scales, 0.0) if combining else linear
+
+
+def _with_combinations(linear: Linearised, scales: FloatArray, factor: float) -> Linearised:
+    """Find the combinations of parameters that the data tell of at a slack; with more slack they tell less."""
+    if any(basis is not None for basis in linear.bases):
+        return linear
+    weights = 1 / (linear.level + factor**2)
+    total = linear._sum(weights, weights)
+    columns = [slice(first, end) for first, end in pairwise(linear.ends)]
+    bases = tuple(_told(total[at, at] * std**2) for at, std in zip(columns, scales, strict=False))
+    joined, ends = linear.joined, linear.ends
+    if any(basis is not None for basis in bases):
+        combined = [
+            joined[:, at] if basis is None else joined[:, at] @ basis for at, basis in zip(columns, bases, strict=True)
+        ]
+        joined = np.hstack([joined[:, : ends[0]], *combined, joined[:, -1:]])
+        ends = tuple(np.cumsum([ends[0], *(piece.shape[1] for piece in combined)]).tolist())
+        total = _combined(total, columns, bases)
+    sums = [(weights, total)] if np.isfinite(total).all() else []
+    return replace(linear, joined=joined, ends=ends, bases=bases, sums=sums, latest=[])
 
 
 def _rounding(noise: TargetNoise, parts: Sequence[FloatArray], stds: FloatArray) -> FloatArray:
@@ -694,6 +697,7 @@ def draw_posterior(
     """
     prior = rng.standard_normal((count, sum(term.root.shape[1] for term in terms)))
     errors = linear.rotated(noise.draw(rng.standard_normal((count, len(linear.data)))).T)
+    linear = _with_combinations(linear, scales, factor)  # at this slack, whatever the scales that are drawn
     chosen, n_common, weights = linear.combined(prior), linear.ends[0], 1 / (linear.level + factor**2)
     by_errors = linear.joined[:, : linear.ends[-1]].T @ (weights[:, None] * errors)
     products = linear.products(weights, np.ones(len(linear.bases)))[:-1, n_common:-1]
