@@ -394,7 +394,9 @@ def linearise(
         slack=units,
         rounding=rounding,
     )
-    return _with_combinations(linear, np.ones(len(ends) - 1) if scales is None else scales, 0.0) if combining else linear
+    return (
+        _with_combinations(linear, np.ones(len(ends) - 1) if scales is None else scales, 0.0) if combining else linear
+    )
 
 
 def _with_combinations(linear: Linearised, scales: FloatArray, factor: float) -> Linearised:
