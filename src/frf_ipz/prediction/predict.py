@@ -8,6 +8,7 @@ FRFs are in the unit of the measurement: where its scale is unknown, the model's
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -182,8 +183,16 @@ def band_of_magnitudes(
     return _magnitude_bands(measured, updated_model, _ensemble(updated_model, s), labels, s)
 
 
+_ensembles: WeakKeyDictionary[UpdatedModel, ModelEnsemble] = WeakKeyDictionary()  # roots of all members cost the most
+
+
 def _ensemble(updated: UpdatedModel, s: ComplexArray) -> ModelEnsemble:
-    return ModelEnsemble(matrices=updated.ensemble, lowest_rad_s=float(np.abs(s[s != 0]).min()))
+    """Give the ensemble in modes: that of before where a model is asked for other FRFs."""
+    lowest_rad_s = float(np.abs(s[s != 0]).min())
+    known = _ensembles.get(updated)
+    if known is None or known.lowest_rad_s != lowest_rad_s:
+        known = _ensembles[updated] = ModelEnsemble(matrices=updated.ensemble, lowest_rad_s=lowest_rad_s)
+    return known
 
 
 def _magnitude_bands(

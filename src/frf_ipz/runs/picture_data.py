@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +29,7 @@ FRFS_SHOWN_AT_FIRST = 6  # the others are a click away
 AT_REST = 1e-9  # of the largest eigenvalue: a rigid-body mode, which no fit has
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ModelsBesideMeasurement:
     """FRFs at the measured points, on all lines of the band.
 
@@ -53,12 +55,13 @@ class ModelsBesideMeasurement:
     has_fitted_gains: bool
     has_window: bool = False
 
-    @property
+    @cached_property
     def names(self) -> list[str]:
         """Name each FRF; with its quantity where the same two DOFs were measured in several."""
         texts = [str(label) for label in self.labels]
+        counts = Counter(texts)
         return [
-            text if texts.count(text) == 1 else f"{text}, {label.quantity.value} ({place + 1})"
+            text if counts[text] == 1 else f"{text}, {label.quantity.value} ({place + 1})"
             for place, (text, label) in enumerate(zip(texts, self.labels, strict=True))
         ]
 

@@ -107,6 +107,8 @@ class Linearised:
         Variance that each datum got besides, since double precision cannot tell less of it from none.
     sums : list of pair of (n,) and (c + k + 1, c + k + 1) array
         Weights of the data, and the sums of products of sensitivity and data with them, as far as they are known.
+    latest : list of pair of (n,) and (c + k + 1, c + k + 1) array
+        The weights that were asked for last, and their sum: scales are searched for at one slack too.
     """
 
     joined: FloatArray
@@ -118,6 +120,7 @@ class Linearised:
     slack: FloatArray
     rounding: FloatArray
     sums: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
+    latest: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
 
     @property
     def data(self) -> FloatArray:
@@ -283,7 +286,15 @@ class Linearised:
         return total
 
     def _sum(self, weights: FloatArray, beside: FloatArray) -> FloatArray:
-        """Mix known sums, or form another; the caller may change what it gets."""
+        """Give the sum, which the caller may change: that of before where weights are the same."""
+        if beside is not weights:  # of a derivative: no one asks for it again
+            return self._mixed(weights, beside)
+        if not (self.latest and np.array_equal(self.latest[0][0], weights)):
+            self.latest[:] = [(weights, self._mixed(weights, beside))]
+        return self.latest[0][1].copy()
+
+    def _mixed(self, weights: FloatArray, beside: FloatArray) -> FloatArray:
+        """Mix known sums, or form another."""
         if self.sums:
             known = np.stack([others / beside for others, _ in self.sums], axis=1)
             sizes = known.max(axis=0)
@@ -373,34 +384,39 @@ def linearise(
     ends = tuple(np.cumsum([piece.shape[1] for piece in pieces]).tolist())
     joined = _rotated(*turned, *pieces, data[:, None])
     del pieces  # large
-    bases: tuple[FloatArray | None, ...] = (None,) * (len(ends) - 1)
-    sums: list[tuple[FloatArray, FloatArray]] = []
-    if combining:
-        total = _sum_of_products(joined, 1 / level)
-        columns = [slice(first, end) for first, end in pairwise(ends)]
-        stds = np.ones(len(columns)) if scales is None else scales
-        bases = tuple(_told(total[at, at] * std**2) for at, std in zip(columns, stds, strict=False))
-        if any(basis is not None for basis in bases):
-            combined = [
-                joined[:, at] if basis is None else joined[:, at] @ basis
-                for at, basis in zip(columns, bases, strict=True)
-            ]
-            joined = np.hstack([joined[:, : ends[0]], *combined, joined[:, -1:]])
-            ends = tuple(np.cumsum([ends[0], *(piece.shape[1] for piece in combined)]).tolist())
-            total = _combined(total, columns, bases)
-        if np.isfinite(total).all():
-            sums.append((1 / level, total))
-    return Linearised(
+    linear = Linearised(
         joined=joined,
         ends=ends,
-        bases=bases,
+        bases=(None,) * (len(ends) - 1),
         level=level,
         axes=turned[0],
         places=turned[1],
         slack=units,
         rounding=rounding,
-        sums=sums,
     )
+    return (
+        _with_combinations(linear, np.ones(len(ends) - 1) if scales is None else scales, 0.0) if combining else linear
+    )
+
+
+def _with_combinations(linear: Linearised, scales: FloatArray, factor: float) -> Linearised:
+    """Find the combinations of parameters that the data tell of at a slack; with more slack they tell less."""
+    if any(basis is not None for basis in linear.bases):
+        return linear
+    weights = 1 / (linear.level + factor**2)
+    total = linear._sum(weights, weights)
+    columns = [slice(first, end) for first, end in pairwise(linear.ends)]
+    bases = tuple(_told(total[at, at] * std**2) for at, std in zip(columns, scales, strict=False))
+    joined, ends = linear.joined, linear.ends
+    if any(basis is not None for basis in bases):
+        combined = [
+            joined[:, at] if basis is None else joined[:, at] @ basis for at, basis in zip(columns, bases, strict=True)
+        ]
+        joined = np.hstack([joined[:, : ends[0]], *combined, joined[:, -1:]])
+        ends = tuple(np.cumsum([ends[0], *(piece.shape[1] for piece in combined)]).tolist())
+        total = _combined(total, columns, bases)
+    sums = [(weights, total)] if np.isfinite(total).all() else []
+    return replace(linear, joined=joined, ends=ends, bases=bases, sums=sums, latest=[])
 
 
 def _rounding(noise: TargetNoise, parts: Sequence[FloatArray], stds: FloatArray) -> FloatArray:
@@ -453,6 +469,7 @@ def with_more_noise(linear: Linearised, noise: TargetNoise, datum: int) -> Linea
         level=level,
         axes=tuple(new_vectors if axes is vectors else axes for axes in linear.axes),
         sums=[],
+        latest=[],
     )
     total = linear.products(1 / linear.level, np.ones(len(linear.bases)))
     total -= _sum_of_products(linear.joined[rows], 1 / linear.level[rows])
@@ -682,13 +699,14 @@ def draw_posterior(
     """
     prior = rng.standard_normal((count, sum(term.root.shape[1] for term in terms)))
     errors = linear.rotated(noise.draw(rng.standard_normal((count, len(linear.data)))).T)
+    linear = _with_combinations(linear, scales, factor)  # at this slack, whatever the scales that are drawn
     chosen, n_common, weights = linear.combined(prior), linear.ends[0], 1 / (linear.level + factor**2)
-    columns = linear.joined[:, : linear.ends[-1]]
+    by_errors = linear.joined[:, : linear.ends[-1]].T @ (weights[:, None] * errors)
+    products = linear.products(weights, np.ones(len(linear.bases)))[:-1, n_common:-1]
     drawn = np.empty_like(prior)
     for evidence, members in _drawn_scales(linear, terms, scales, factor, rng, count):
         factors = linear.factors(evidence.scales)[:, None]
-        pretended = columns[:, n_common:] @ (factors[n_common:] * chosen[members].T) + errors[:, members]
-        right = factors * (columns.T @ (weights[:, None] * pretended))
+        right = factors * (products @ (factors[n_common:] * chosen[members].T) + by_errors[:, members])
         correction = cho_solve((evidence.root, False), right, check_finite=False)
         changed = evidence.mean[n_common:, None] - correction[n_common:]
         sizes = [term.root.shape[1] for term in terms]
@@ -718,14 +736,14 @@ def _drawn_scales(
     root = np.linalg.cholesky(top.curvature())
     white = rng.standard_normal(((count + DRAWS_OF_A_SCALE - 1) // DRAWS_OF_A_SCALE, len(center)))
     white[len(white) // 2 :] = -white[: len(white) - len(white) // 2]
-    found = [search.try_evidence(logs) for logs in center + np.linalg.solve(root.T, white.T).T]
-    told = [number for number, evidence in enumerate(found) if evidence is not None]
-    tried = [evidence for evidence in found if evidence is not None]
-    logs_of_weights = 0.5 * np.sum(white[told] ** 2, axis=1) - np.array([evidence.value for evidence in tried])
+    tried = center + np.linalg.solve(root.T, white.T).T
+    values = np.array([search.try_value(logs) for logs in tried])
+    told = np.isfinite(values)
+    logs_of_weights = 0.5 * np.sum(white[told] ** 2, axis=1) - values[told]
     shares = np.cumsum(np.exp(logs_of_weights - logs_of_weights.max()))
-    owners = np.searchsorted(shares, (np.arange(count) + 0.5) / count * shares[-1])
-    for owner in np.unique(owners).tolist():
-        yield tried[owner], np.flatnonzero(owners == owner)
+    owners = np.flatnonzero(told)[np.searchsorted(shares, (np.arange(count) + 0.5) / count * shares[-1])]
+    for owner in np.unique(owners).tolist():  # each again: to keep all takes more memory than the data
+        yield search.evidence(tried[owner]), np.flatnonzero(owners == owner)
 
 
 def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: FloatArray) -> FloatArray:
@@ -828,6 +846,11 @@ class _ScaleSearch:
             return self.evidence(logs)
         except np.linalg.LinAlgError:
             return None
+
+    def try_value(self, logs: FloatArray) -> float:
+        """Value there alone; infinite where there is none."""
+        evidence = self.try_evidence(logs)
+        return np.inf if evidence is None else evidence.value
 
     def evidence(self, logs: FloatArray) -> _Evidence:
         """Value there; slope and expected curvature on demand."""

@@ -62,7 +62,7 @@ class UpdateStatus(Enum):
     NO_BETTER = "it made the agreement with the measured FRFs worse: the model is as it was before"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, eq=False)
 class UpdatedModel(Tabulated, Drawn):
     """A reduced model after updating.
 

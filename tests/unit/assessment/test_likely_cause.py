@@ -350,3 +350,19 @@ def test_what_another_mistake_is_worth_at_most_is_never_less_than_what_it_is_wor
         causes = list(kind(situation))
         exact = np.array([log_evidence(cause, situation) for cause in causes])
         assert np.all(bound_costs(situation).largest_logs(causes) >= exact - 1e-9 * np.abs(exact))
+
+
+@pytest.mark.parametrize("length_m", [BEAM["length_m"], 1.05 * BEAM["length_m"]])
+def test_what_a_mistake_is_worth_follows_from_the_costs_of_the_model_as_it_stands(fit, length_m):
+    """What a mistake does not change is not computed again, so each costs the same however many sensors there are."""
+    beam = frf_ipz.make_beam(**{**BEAM, "length_m": length_m})
+    modes = computed_modes(frf_ipz.solve_modes(beam, n_modes=24))
+    situation = Situation(
+        measured=measured_modes(fit), computed=modes, model=beam, test_file="test.toml", model_file="model.toml"
+    )
+    bounds = bound_costs(situation)
+    for kind in KINDS:
+        found = kind(situation)
+        causes = [found[number] for number in range(len(found))] if hasattr(found, "__getitem__") else list(found)
+        exact = [log_evidence(cause, situation) for cause in causes]
+        assert [bounds.log_evidence(cause) for cause in causes] == pytest.approx(exact, rel=1e-10)

@@ -12,6 +12,8 @@ from chains import updated as as_updated
 from frf_ipz.dofs import Dof
 from frf_ipz.errors import InputError
 from frf_ipz.fe.response import compute_frfs
+from frf_ipz.numerics.damped_modes import receptance_roots
+from frf_ipz.prediction import ensemble as ensembles
 from frf_ipz.prediction.advice import WIDE_DB, wide_bands
 from frf_ipz.prediction.predict import predict_frfs
 from frf_ipz.quantities import FrfQuantity
@@ -194,3 +196,19 @@ def test_points_need_not_be_retained():
     model = updated(case.reduced_model)
     prediction = predict_frfs(case.fit, model, points=expanded[:2], frequency_hz=np.linspace(*case.fit.band_hz, 50))
     assert np.isfinite(prediction.values).all()
+
+
+def test_roots_of_an_ensemble_are_found_once_for_all_its_bands(monkeypatch):
+    """A model's ensemble is in modes once, be it asked for points of interest or for what was measured."""
+    found = []
+
+    def counted(*arguments):
+        found.append(1)
+        return receptance_roots(*arguments)
+
+    monkeypatch.setattr(ensembles, "receptance_roots", counted)
+    model = chain(between=True)
+    result = updated(model, spread(model, 0.01, 5))
+    for points in (POINTS[:1], POINTS[1:]):
+        predict_frfs(measured(LABELS), result, points=points, frequency_hz=LINES)
+    assert len(found) == 5

@@ -73,3 +73,8 @@ def test_every_measured_mode_has_its_own_shape_in_the_updated_model(run):
 def test_one_dof_says_nothing_about_shapes(run):
     one = replace(run.fit, labels=(run.fit.labels[0],) * len(run.fit.labels))
     assert shape_agreements(with_results(run, fit=one)) == []
+
+
+def test_frfs_are_named_once_for_all_pictures(run):
+    compared = models_beside_measurement(run)
+    assert compared.names is compared.names

@@ -1,5 +1,7 @@
 """The linear Gaussian step, its draws and its evidence, against what they are by definition."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -135,6 +137,34 @@ def test_draws_leave_open_what_the_data_leave_open_of_the_scales():
     assert_allclose(members.std(axis=0), std, rtol=0.1)
     alone = posterior(np.hstack([scale * part for scale, part in zip(scales, parts, strict=True)]), data, noise)[1]
     assert np.abs(np.repeat(scales, [2, 3]) * np.sqrt(np.diagonal(alone)) / std - 1).max() > 0.2
+
+
+def few_data_of_many_parameters(combining):
+    """Twenty data of two hundred parameters in two terms."""
+    rng = np.random.default_rng(21)
+    parts = [rng.standard_normal((20, 120)), rng.standard_normal((20, 80))]
+    terms = [PriorTerm(name=str(k), root=np.eye(part.shape[1]), std=1.0) for k, part in enumerate(parts)]
+    return linearise(parts, rng.standard_normal(20), noise_of(0.1 * np.eye(20)), combining=combining), terms
+
+
+def test_draws_are_the_same_whether_combinations_were_found_before_or_not():
+    draws = []
+    for combining in (True, False):
+        linear, terms = few_data_of_many_parameters(combining)
+        noise, rng = noise_of(0.1 * np.eye(20)), np.random.default_rng(1)
+        draws.append(draw_posterior(linear, terms, np.ones(2), noise, rng, 200, factor=0.0))
+    assert_allclose(*draws, rtol=0, atol=1e-3)  # of a standard deviation of the prior
+
+
+def test_draws_take_the_memory_of_a_few_matrices_of_the_parameters():
+    """Not that of one for each draw of the scales, of which there are fifty."""
+    linear, terms = few_data_of_many_parameters(combining=False)
+    noise, rng = noise_of(0.1 * np.eye(20)), np.random.default_rng(1)
+    tracemalloc.start()
+    draw_posterior(linear, terms, np.ones(2), noise, rng, 200, factor=0.0)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 12 * 200**2 * np.dtype(float).itemsize
 
 
 def test_the_most_likely_scales_have_the_largest_evidence():

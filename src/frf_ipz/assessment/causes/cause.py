@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from frf_ipz.assessment.causes.modal_comparison import ComputedModes, MeasuredModes, log_likelihood
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import ComplexArray
+    from frf_ipz.arrays import BoolArray, ComplexArray
     from frf_ipz.dofs import AnyDof
     from frf_ipz.structure import StructuralModel
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 EXPECTED_COST = 2 * np.log(2)  # of a datum whose error is drawn from Cauchy's distribution: the mean of log(1 + x^2)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Situation:
     """What is known when a cause is looked for.
 
@@ -43,6 +44,14 @@ class Situation:
     test_file: str
     model_file: str
     is_recorded: bool = True
+
+    @cached_property
+    def channels(self) -> dict[AnyDof, str]:
+        """Name of the channel of each sensor, by its unsigned DOF."""
+        names: dict[AnyDof, str] = {}
+        for label in self.measured.labels:
+            names.setdefault(label.output_dof.unsigned, label.output_channel or str(label.output_dof))
+        return names
 
     def key_of(self, side: str, channel: str, key: str) -> str:
         """Name the key of the test in which something is said of a channel.
@@ -79,7 +88,9 @@ class Cause:
     frequency_factor : float
         The right frequencies over the computed ones.
     gain : complex or (n_frfs,) array
-        What the channels show over what the computed modes give.
+        What channels show over what the computed modes give.
+    gained : (n_frfs,) bool array, optional
+        The FRFs of these channels, which have one gain; all where it is left out.
     power : int
         The channels show this many derivatives more than they are said to.
     moved_outputs, moved_inputs : mapping of Dof to Dof
@@ -95,6 +106,7 @@ class Cause:
     line_or_key: str
     frequency_factor: float = 1.0
     gain: complex | ComplexArray = 1.0
+    gained: BoolArray | None = None
     power: int = 0
     moved_outputs: Mapping[AnyDof, AnyDof] = field(default_factory=dict)
     moved_inputs: Mapping[AnyDof, AnyDof] = field(default_factory=dict)
@@ -175,4 +187,5 @@ def changed_modes(cause: Cause, situation: Situation) -> tuple[np.ndarray, np.nd
     computed = cause.computed or situation.computed
     frequency_hz = computed.frequency_hz * cause.frequency_factor
     products = computed.products(situation.measured.labels, cause.moved_outputs, cause.moved_inputs)
-    return frequency_hz, products * cause.gain * (2j * np.pi * frequency_hz[:, None]) ** cause.power
+    gain = cause.gain if cause.gained is None else np.where(cause.gained, cause.gain, 1.0)
+    return frequency_hz, products * gain * (2j * np.pi * frequency_hz[:, None]) ** cause.power

@@ -101,7 +101,7 @@ def of_one_output(situation: Situation) -> Iterator[Cause]:
     for name, mask in channels.items():
         for gain, text in OF_OUTPUTS.items():
             says, key = f"the channel '{name}' {text}", situation.key_of("output", name, "unit")
-            yield _test_cause(situation, says, key, gain=np.where(mask, gain, 1.0).astype(complex), log_prior=prior)
+            yield _test_cause(situation, says, key, gain=gain, gained=mask, log_prior=prior)
 
 
 def of_signs(situation: Situation) -> Iterator[Cause]:
@@ -122,11 +122,11 @@ def of_signs(situation: Situation) -> Iterator[Cause]:
     for name, mask in channels.items():
         says = f"the sensor of '{name}' measures the other way round: turn the sign of its dof"
         key = situation.key_of("output", name, "dof")
-        yield _test_cause(situation, says, key, gain=np.where(mask, -1.0, 1.0).astype(complex), log_prior=prior)
+        yield _test_cause(situation, says, key, gain=-1.0, gained=mask, log_prior=prior)
     for name, mask in points.items() if len(points) > 1 else ():
         says = f"the force at {name} acts the other way round: turn the sign of its dof"
         key = f"[[hit]], [[record]] or [[frf]] of {name}: dof"
-        yield _test_cause(situation, says, key, gain=np.where(mask, -1.0, 1.0).astype(complex), log_prior=prior)
+        yield _test_cause(situation, says, key, gain=-1.0, gained=mask, log_prior=prior)
     if len(channels) > 1:
         says = "the force has the other sign: turn the signs of the dofs of all inputs, or of the force in the files"
         yield _test_cause(situation, says, "dof of the inputs", gain=-1.0, log_prior=prior)
@@ -156,22 +156,34 @@ def _test_cause(
     says: str,
     key: str,
     *,
-    gain: complex | np.ndarray = 1.0,
+    gain: complex = 1.0,
+    gained: BoolArray | None = None,
     power: int = 0,
     log_prior: float = 0.0,
 ) -> Cause:
     return Cause(
-        says=says, file=situation.test_file, line_or_key=key, gain=gain, power=power, log_prior=float(log_prior)
+        says=says,
+        file=situation.test_file,
+        line_or_key=key,
+        gain=gain,
+        gained=gained,
+        power=power,
+        log_prior=float(log_prior),
     )
 
 
 def _channels(situation: Situation) -> dict[str, BoolArray]:
     """Give which FRFs each output channel is in, by its name."""
     names = [label.output_channel or str(label.output_dof) for label in situation.measured.labels]
-    return {name: np.array([other == name for other in names]) for name in dict.fromkeys(names)}
+    return _where(names)
 
 
 def _points(situation: Situation) -> dict[str, BoolArray]:
     """Give which FRFs each excited DOF is in, by its name."""
     names = [str(label.input_dof) for label in situation.measured.labels]
-    return {name: np.array([other == name for other in names]) for name in dict.fromkeys(names)}
+    return _where(names)
+
+
+def _where(names: list[str]) -> dict[str, BoolArray]:
+    distinct, number = np.unique(np.array(names), return_inverse=True)
+    return {name: number == np.searchsorted(distinct, name) for name in dict.fromkeys(names)}

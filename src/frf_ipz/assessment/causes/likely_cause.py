@@ -90,7 +90,7 @@ def _log_evidences(situation: Situation, best: float) -> tuple[list[Cause], list
         if largest_logs[place] < best - NEGLIGIBLE:
             break
         found.append(kinds[whose[place]][int(number[place])])
-        logs.append(log_evidence(found[-1], situation))
+        logs.append(bounds.log_evidence(found[-1]))
         best = max(best, logs[-1])
     return found, logs
 

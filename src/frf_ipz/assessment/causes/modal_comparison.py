@@ -172,7 +172,7 @@ def computed_modes(modes: ModeSet) -> ComputedModes:
     )
 
 
-def log_likelihood(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray) -> float:
+def log_likelihood(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray | FloatArray) -> float:
     """Give the log likelihood of the measured modes, where the model is nearly right but for what was changed in it.
 
     Every measured mode is assigned a computed one. Errors of frequencies and of products of shapes are drawn from
@@ -192,11 +192,45 @@ def log_likelihood(measured: MeasuredModes, frequency_hz: FloatArray, products: 
     float
         Natural logarithm; 0 where all agrees.
     """
-    costs = _costs(measured, frequency_hz, products)
-    not_computed = costs_of_absence(measured, measured.products)
+    return assigned_log_likelihood(
+        measured,
+        frequency_hz,
+        _costs(measured, frequency_hz, products),
+        costs_of_absence(measured, measured.products),
+        costs_of_absence(measured, products),
+    )
+
+
+def assigned_log_likelihood(
+    measured: MeasuredModes,
+    frequency_hz: FloatArray,
+    costs: FloatArray,
+    not_computed: FloatArray,
+    not_measured: FloatArray,
+) -> float:
+    """Give the log likelihood from the costs of all pairs of modes, under the assignment that costs least.
+
+    Parameters
+    ----------
+    measured : MeasuredModes
+        The measurement.
+    frequency_hz : (n_computed,) array
+        Of the changed model.
+    costs : (n_modes, n_computed) array
+        Of each pair; infinite to one that is far.
+    not_computed : (n_modes,) array
+        Of measured modes without a counterpart.
+    not_measured : (n_computed,) array
+        Of computed modes that nobody measured, wherever they are.
+
+    Returns
+    -------
+    float
+        Natural logarithm.
+    """
     rows, columns = _assign(costs, not_computed)
-    not_measured = np.minimum(costs_of_absence(measured, products), _costs_outside(measured, frequency_hz))
-    alone = np.delete(not_computed, rows).sum() + np.delete(not_measured, columns).sum()
+    unseen = np.minimum(not_measured, _costs_outside(measured, frequency_hz))
+    alone = np.delete(not_computed, rows).sum() + np.delete(unseen, columns).sum()
     return float(-costs[rows, columns].sum() - alone)
 
 
@@ -214,7 +248,7 @@ def _assign(costs: FloatArray, alone: FloatArray) -> tuple[IntArray, IntArray]:
     return rows[assigned], columns[assigned]
 
 
-def _costs(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray) -> FloatArray:
+def _costs(measured: MeasuredModes, frequency_hz: FloatArray, products: ComplexArray | FloatArray) -> FloatArray:
     """Costs of assigning each measured mode (rows) to each computed one (columns); infinite to one that is far."""
     near, costs = cost_of_frequency(measured.frequency_hz, frequency_hz)
     rows, columns = np.nonzero(near)
@@ -271,7 +305,7 @@ def cost_of_products(
     return np.asarray(np.log1p(errors**2))
 
 
-def costs_of_absence(measured: MeasuredModes, products: ComplexArray) -> FloatArray:
+def costs_of_absence(measured: MeasuredModes, products: ComplexArray | FloatArray) -> FloatArray:
     """Give the costs of modes without a counterpart, measured ones or computed ones: little for one that hardly shows.
 
     At most a mode is far in frequency, and its products of shapes are off by their own size. A false mode of a fit is
@@ -289,14 +323,52 @@ def costs_of_absence(measured: MeasuredModes, products: ComplexArray) -> FloatAr
     (n_modes,) array
         As for `cost_of_products`.
     """
-    visible = _visibility(measured, products)
-    shapes = np.minimum(np.log1p(visible**2).sum(axis=1), cost_of_own_size(products.shape[1]))
-    return np.asarray(np.log1p(FAR**2) * visible.max(axis=1).clip(max=1) + shapes)
+    visible = visibility(measured, products)
+    return absence_of(np.log1p(visible**2).sum(axis=1), visible.max(axis=1), products.shape[1])
 
 
-def _visibility(measured: MeasuredModes, products: ComplexArray) -> FloatArray:
-    """(n_modes, n_frfs) sizes of products beside what is off in those of a measured mode."""
-    scale = SHAPE_SCALE * np.sqrt(np.mean(np.abs(measured.products) ** 2, axis=0))
+def absence_of(log_sizes: FloatArray, largest: FloatArray, n_frfs: int) -> FloatArray:
+    """Give the costs of modes without a counterpart from what is visible of them; see `costs_of_absence`.
+
+    Parameters
+    ----------
+    log_sizes : (n_modes,) array
+        Sum over the FRFs of ``log(1 + v^2)`` for a visibility v.
+    largest : (n_modes,) array
+        Visibility in the FRF that shows the mode best.
+    n_frfs : int
+        Number of FRFs.
+
+    Returns
+    -------
+    (n_modes,) array
+        As for `cost_of_products`.
+    """
+    shapes = np.minimum(log_sizes, cost_of_own_size(n_frfs))
+    return np.asarray(np.log1p(FAR**2) * largest.clip(max=1) + shapes)
+
+
+def visibility(
+    measured: MeasuredModes, products: ComplexArray | FloatArray, frfs: IntArray | None = None
+) -> FloatArray:
+    """Give the sizes of products of shapes beside what is off in those of a measured mode.
+
+    Parameters
+    ----------
+    measured : MeasuredModes
+        The measurement.
+    products : (n_modes, n_frfs) array
+        1/kg.
+    frfs : (n_frfs,) int array, optional
+        Which FRFs these are; all by default.
+
+    Returns
+    -------
+    (n_modes, n_frfs) array
+        Without a unit.
+    """
+    own = measured.products if frfs is None else measured.products[:, frfs]
+    scale = SHAPE_SCALE * np.sqrt(np.mean(np.abs(own) ** 2, axis=0))
     return np.asarray(np.abs(products) / np.maximum(scale, np.finfo(float).tiny))
 
 

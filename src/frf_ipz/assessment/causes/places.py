@@ -16,7 +16,7 @@ from frf_ipz.dofs import AnyDof, Dof, node_dofs
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+    from frf_ipz.arrays import BoolArray, FloatArray, IntArray
     from frf_ipz.assessment.causes.cause import Situation
 
 
@@ -33,7 +33,9 @@ class ExchangedSensors:
     first, second : (n,) int array
         The two sensors of each pair.
     signs : (n_sensors,) array
-        Of the DOFs of the sensors, as they are written.
+        Of the DOFs of the sensors, as they are written: dofs are exchanged with them.
+    frfs : (n_sensors, n_frfs) bool array
+        Which FRFs are those of each sensor.
     """
 
     situation: Situation
@@ -41,6 +43,7 @@ class ExchangedSensors:
     first: IntArray
     second: IntArray
     signs: FloatArray
+    frfs: BoolArray
 
     def __len__(self) -> int:
         """Count the pairs."""
@@ -49,12 +52,13 @@ class ExchangedSensors:
     def __getitem__(self, number: int, /) -> Cause:
         """Give a pair as a cause."""
         first, second = self.sensors[self.first[number]], self.sensors[self.second[number]]
-        keys = [self.situation.key_of("output", _channel(self.situation, dof), "dof") for dof in (first, second)]
-        written = [label.output_dof for label in self.situation.measured.labels]
+        keys = [self.situation.key_of("output", self.situation.channels[dof], "dof") for dof in (first, second)]
         moved = {first: second, second: first}
         says = f"the sensors at {first.name} and {second.name} are exchanged: exchange their dofs"
-        gain = _gain_of_exchange(written, moved)
-        return _moved(self.situation, says, "; ".join(keys), moved, {}, len(self), gain=gain)
+        ends = [self.first[number], self.second[number]]
+        sign = float(self.signs[ends].prod())
+        frfs = np.asarray(np.any(self.frfs[ends], axis=0))
+        return _moved(self.situation, says, "; ".join(keys), moved, {}, len(self), sign=sign, of=frfs)
 
 
 def exchanged_sensors(situation: Situation) -> ExchangedSensors:
@@ -78,6 +82,7 @@ def exchanged_sensors(situation: Situation) -> ExchangedSensors:
         first=first,
         second=second,
         signs=np.array(list(signs.values()), float),
+        frfs=_frfs_of(signs, [label.output_dof.unsigned for label in situation.measured.labels]),
     )
 
 
@@ -94,14 +99,15 @@ def exchanged_inputs(situation: Situation) -> Iterator[Cause]:
     Cause
         One a pair.
     """
-    inputs = _unique(label.input_dof.unsigned for label in situation.measured.labels)
-    pairs = list(combinations(inputs, 2))
-    for first, second in pairs:
+    signs = {label.input_dof.unsigned: label.input_dof.sign for label in situation.measured.labels}
+    frfs = _frfs_of(signs, [label.input_dof.unsigned for label in situation.measured.labels])
+    pairs = list(combinations(zip(signs, frfs, strict=True), 2))
+    for (first, of_first), (second, of_second) in pairs:
         says = f"the excited points {first.name} and {second.name} are exchanged: exchange their dofs"
         key = f"dof of {first.name} and {second.name} in [[hit]], [[record]] or [[frf]]"
         moved = {first: second, second: first}
-        written = [label.input_dof for label in situation.measured.labels]
-        yield _moved(situation, says, key, {}, moved, len(pairs), gain=_gain_of_exchange(written, moved))
+        sign = float(signs[first] * signs[second])
+        yield _moved(situation, says, key, {}, moved, len(pairs), sign=sign, of=of_first | of_second)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -133,7 +139,7 @@ class MisplacedSensors:
         """Give a sensor at a node as a cause."""
         sensor = int(np.searchsorted(self.ends, number, side="right"))
         dof, nodes = self.sensors[sensor], self.places[sensor]
-        place, channel = nodes[number - int(self.ends[sensor]) + len(nodes)], _channel(self.situation, dof)
+        place, channel = nodes[number - int(self.ends[sensor]) + len(nodes)], self.situation.channels[dof]
         says = f"the sensor of '{channel}' seems to sit near {place.name}, not at {dof.name}: correct its dof"
         key = self.situation.key_of("output", channel, "dof")
         return _moved(self.situation, says, key, {dof: place}, {}, len(self))
@@ -203,11 +209,10 @@ def mirrored(situation: Situation) -> Iterator[Cause]:
             yield _moved(situation, says, key, moved, moved, 3)
 
 
-def _gain_of_exchange(written: Sequence[AnyDof], moved: Mapping[AnyDof, AnyDof]) -> ComplexArray:
-    """Give the sign that an exchange leaves in each FRF: dofs are exchanged with their signs."""
-    signs = {dof.unsigned: dof.sign for dof in written}
-    first, second = (signs[dof] for dof in moved)
-    return np.array([first * second if dof.unsigned in moved else 1 for dof in written], complex)
+def _frfs_of(dofs: Iterable[AnyDof], ends: Sequence[AnyDof]) -> BoolArray:
+    """Which FRFs, by the DOF at one of their ends, are those of each DOF, (n_dofs, n_frfs)."""
+    number = {dof: place for place, dof in enumerate(dofs)}
+    return np.asarray(np.array([number[end] for end in ends]) == np.arange(len(number))[:, None])
 
 
 def _moved(
@@ -218,7 +223,8 @@ def _moved(
     inputs: Mapping[AnyDof, AnyDof],
     count: int,
     *,
-    gain: complex | ComplexArray = 1.0,
+    sign: float = 1.0,
+    of: BoolArray | None = None,
 ) -> Cause:
     return Cause(
         says=says,
@@ -226,16 +232,11 @@ def _moved(
         line_or_key=key,
         moved_outputs=outputs,
         moved_inputs=inputs,
-        gain=gain,
+        gain=sign,
+        gained=of,
         log_prior=-float(np.log(max(count, 1))),
     )
 
 
 def _unique(dofs: Iterable[AnyDof]) -> list[AnyDof]:
     return list(dict.fromkeys(dofs))
-
-
-def _channel(situation: Situation, dof: AnyDof) -> str:
-    """Name the channel of a sensor."""
-    label = next(label for label in situation.measured.labels if label.output_dof.unsigned == dof)
-    return label.output_channel or str(label.output_dof)
