@@ -1,6 +1,7 @@
 """Recordings as calibrated numbers: SI, uniform in time, block by block or segment by segment.
 
-Files are streamed; small ones are cached within a fixed budget of memory, since a test is read more than once.
+Files are streamed; small ones are cached within a fixed budget of memory, since a test is read more than once. What a
+survey has found in them is kept with them: FRFs, diagnosis and levels of a test work with the same one.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import AnyDof
     from frf_ipz.ingest.campaign import Channel, SecondRecorder, TestSetup, VibrationTest
     from frf_ipz.ingest.formats.recording import RawRecording, TableKeys
+    from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.survey.record_info import Survey
 
 BUDGET = 64_000_000  # bytes of recordings that are cached
 UNIFORM = 0.01  # of the median step: the contract's limit for a step that differs
@@ -40,6 +43,8 @@ class RecordingFiles:
     ----------
     test : VibrationTest
         Its columns, their units and its files.
+    surveys : dict of IngestOptions to Survey
+        What `survey_records` has found, by the user's choice.
     """
 
     test: VibrationTest
@@ -47,6 +52,7 @@ class RecordingFiles:
     _cached_bytes: int = 0
     _notes: dict[str, dict[Path, None]] = field(default_factory=dict)
     _alignments: dict[Path, Alignment] = field(default_factory=dict)
+    surveys: dict[IngestOptions, Survey] = field(default_factory=dict, repr=False)
 
     @property
     def notes(self) -> tuple[str, ...]:
