@@ -136,10 +136,12 @@ def survey_records(files: RecordingFiles, options: IngestOptions, progress: Prog
     kind = files.test.kind
     if kind not in SURVEYS:
         raise InputError(f"{files.test.path}: a test of kind '{kind}' has no recordings; there are no records to read")
-    if options not in files.surveys:
-        survey = SURVEYS[kind](files, options, progress)
-        files.surveys[options] = replace(survey, choices=(*files.notes, *survey.choices))
-    return files.surveys[options]
+
+    def survey() -> Survey:
+        found = SURVEYS[kind](files, options, progress)
+        return replace(found, choices=(*files.notes, *found.choices))
+
+    return files.once(options, survey)
 
 
 def read_records(files: RecordingFiles, options: IngestOptions, *, used_only: bool = True) -> Iterator[Record]:
