@@ -30,7 +30,7 @@ from frf_ipz.diagnosis.nonlinear.linearisation import linearise
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 from frf_ipz.diagnosis.nonlinear.search import MIN_LOG_BAYES_FACTOR as LAW_NATS
 from frf_ipz.diagnosis.nonlinear.search import search_laws
-from frf_ipz.diagnosis.observations import Observations, observe
+from frf_ipz.diagnosis.observations import Observations, observe_from
 from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.result import NOT_DETECTABLE, Ambiguity, Diagnosis, DiagnosisVerdict, as_appearance
 from frf_ipz.diagnosis.search.component_search import fit_null_model
@@ -58,7 +58,9 @@ from frf_ipz.diagnosis.verdict.proof import prove
 from frf_ipz.diagnosis.verdict.unnamed_force import describe_unnamed_force, find_unnamed_force
 from frf_ipz.frf import FrfSet
 from frf_ipz.ingest.campaign import VibrationTest
-from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.estimate import estimate_from
+from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.progress import silent
 from frf_ipz.structure import StructuralModel
@@ -75,7 +77,6 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.verdict.findings import RankedEffect
     from frf_ipz.diagnosis.verdict.proof import Proof
     from frf_ipz.identification.options import FitOptions
-    from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.progress import Progress
 
 CLEARLY_NONLINEAR = 4.0  # times the limit of linearity: below, a linear explanation that leaves nothing comes first
@@ -219,8 +220,9 @@ def _as_observations(
     if isinstance(data, Observations):
         return data
     test = VibrationTest.from_frfs(data) if isinstance(data, FrfSet) else data
-    known = estimate_frfs(test, options=ingest).frfs if frfs is None else frfs
-    return observe(test, frfs=known, ingest=ingest, fit=fit)
+    files = RecordingFiles(test=test)
+    known = estimate_from(files, ingest or IngestOptions()).frfs if frfs is None else frfs
+    return observe_from(files, frfs=known, ingest=ingest, fit=fit)
 
 
 def _diagnose(

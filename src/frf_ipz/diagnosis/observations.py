@@ -19,6 +19,7 @@ from frf_ipz.identification.measured_lines import measured_lines
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.campaign import VibrationTest
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.records import read_records
 from frf_ipz.quantities import FrfQuantity
 
@@ -353,6 +354,36 @@ def observe(
     require_type("frfs", frfs, FrfSet)
     require_type("ingest", ingest, IngestOptions, optional=True)
     require_type("fit", fit, FitOptions, optional=True)
+    return observe_from(RecordingFiles(test=test), frfs=frfs, ingest=ingest, fit=fit)
+
+
+def observe_from(
+    files: RecordingFiles, *, frfs: FrfSet, ingest: IngestOptions | None = None, fit: FitOptions | None = None
+) -> Observations:
+    """Gather what a diagnosis works with, from recordings that may have been read before.
+
+    Parameters
+    ----------
+    files : RecordingFiles
+        The recordings of the test; none for a test of FRFs.
+    frfs : FrfSet
+        The FRFs that were estimated from it, or elsewhere.
+    ingest : IngestOptions, optional
+        How its recordings are used.
+    fit : FitOptions, optional
+        Which band to analyse, and which parts of it not.
+
+    Returns
+    -------
+    Observations
+        As `observe` gives them.
+
+    Raises
+    ------
+    InputError
+        As `observe` does.
+    """
+    test = files.test
     if test.modes is not None:
         raise InputError(WITHOUT_FRFS)
     chosen = fit or FitOptions()
@@ -362,7 +393,7 @@ def observe(
     if test.kind != "frf" and frfs.unknown_scale == "none" and len(test.input_channels) == 1:
         records = tuple(
             _select_sensors(record, test)
-            for record in read_records(test, ingest or IngestOptions())
+            for record in read_records(files, ingest or IngestOptions())
             if set(record.labels) & set(test.labels)
         )
     kind = test.kind if records else "frf"

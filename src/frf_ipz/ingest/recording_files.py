@@ -1,13 +1,14 @@
 """Recordings as calibrated numbers: SI, uniform in time, block by block or segment by segment.
 
-Files are streamed; small ones are cached within a fixed budget of memory, since a test is read more than once.
+Files are streamed; small ones are cached within a fixed budget of memory, since a test is read more than once. What a
+survey has found in them is kept with them: FRFs, diagnosis and levels of a test work with the same one.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -18,13 +19,15 @@ from frf_ipz.ingest.signals.alignment import AGREES, Alignment, align, join
 from frf_ipz.ingest.units import is_stated, sensitivity_factor, unit_factor, unit_ratio
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Hashable, Iterator, Sequence
     from pathlib import Path
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.dofs import AnyDof
     from frf_ipz.ingest.campaign import Channel, SecondRecorder, TestSetup, VibrationTest
     from frf_ipz.ingest.formats.recording import RawRecording, TableKeys
+
+Found = TypeVar("Found")
 
 BUDGET = 64_000_000  # bytes of recordings that are cached
 UNIFORM = 0.01  # of the median step: the contract's limit for a step that differs
@@ -47,6 +50,7 @@ class RecordingFiles:
     _cached_bytes: int = 0
     _notes: dict[str, dict[Path, None]] = field(default_factory=dict)
     _alignments: dict[Path, Alignment] = field(default_factory=dict)
+    _found: dict[object, Any] = field(default_factory=dict, repr=False)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -69,6 +73,26 @@ class RecordingFiles:
         rates = [1e6 * alignment.drift for alignment in found if alignment.drift]
         drift = f", its clock off by up to {max(map(abs, rates)):.2g} ppm" if rates else ""
         return [f"second recorder: it began {span} after the first (+- {std:.2g} ms) by {how}{drift}"]
+
+    def once(self, key: Hashable, find: Callable[[], Found]) -> Found:
+        """Give what was found in the recordings before, or find it.
+
+        Parameters
+        ----------
+        key : hashable
+            What it depends on besides the recordings.
+        find : callable
+            Called for a new key.
+
+        Returns
+        -------
+        object
+            What it has found.
+        """
+        if key not in self._found:
+            self._found[key] = find()
+        found: Found = self._found[key]
+        return found
 
     def blocks(self, setup: TestSetup, path: Path) -> Iterator[FloatArray]:
         """Give a recording block by block.

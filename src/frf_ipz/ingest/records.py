@@ -15,7 +15,6 @@ from frf_ipz.arrays import FloatArray, read_only
 from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.campaign import setup_labels
-from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.signals.windows import window_impact
 from frf_ipz.ingest.survey.hammer import survey_hammer
 from frf_ipz.ingest.survey.random import survey_random
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.options import IngestOptions
+    from frf_ipz.ingest.recording_files import RecordingFiles
     from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
 
 SURVEYS = {"hammer": survey_hammer, "random": survey_random}
@@ -112,7 +112,7 @@ class Record:
 
 
 def survey_records(files: RecordingFiles, options: IngestOptions, progress: Progress = silent) -> Survey:
-    """Check all records of a test and decide how they are used.
+    """Check all records of a test and decide how they are used; once, however often it is asked for.
 
     Parameters
     ----------
@@ -136,30 +136,23 @@ def survey_records(files: RecordingFiles, options: IngestOptions, progress: Prog
     kind = files.test.kind
     if kind not in SURVEYS:
         raise InputError(f"{files.test.path}: a test of kind '{kind}' has no recordings; there are no records to read")
-    survey = SURVEYS[kind](files, options, progress)
-    return replace(survey, choices=(*files.notes, *survey.choices))
+
+    def survey() -> Survey:
+        found = SURVEYS[kind](files, options, progress)
+        return replace(found, choices=(*files.notes, *found.choices))
+
+    return files.once(options, survey)
 
 
-def read_records(
-    test: VibrationTest,
-    options: IngestOptions,
-    *,
-    survey: Survey | None = None,
-    files: RecordingFiles | None = None,
-    used_only: bool = True,
-) -> Iterator[Record]:
+def read_records(files: RecordingFiles, options: IngestOptions, *, used_only: bool = True) -> Iterator[Record]:
     """Read the records of a test, one at a time.
 
     Parameters
     ----------
-    test : VibrationTest
-        The test, of kind ``hammer`` or ``random``.
+    files : RecordingFiles
+        The recordings of a test of kind ``hammer`` or ``random``.
     options : IngestOptions
         The user's choice.
-    survey : Survey, optional
-        The test's, where it exists already.
-    files : RecordingFiles, optional
-        The test's, where they are open already.
     used_only : bool
         Leave out records that do not enter the FRFs.
 
@@ -173,14 +166,13 @@ def read_records(
     InputError
         If a recording cannot be used.
     """
-    files = files or RecordingFiles(test=test)
-    survey = survey or survey_records(files, options)
+    survey = survey_records(files, options)
     selected_infos = survey.used if used_only else survey.records
     for path, group in groupby(selected_infos, key=lambda info: info.path):
         infos = list(group)
         segments = files.segments(infos[0].setup, path, [(info.start, info.stop) for info in infos])
         for info, signals in zip(infos, segments, strict=True):
-            yield _make_record(test, info, signals)
+            yield _make_record(files.test, info, signals)
 
 
 def _make_record(test: VibrationTest, info: RecordInfo, signals: FloatArray) -> Record:

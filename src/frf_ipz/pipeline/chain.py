@@ -17,11 +17,13 @@ from frf_ipz.pipeline.stages import measurement, mismatch
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from frf_ipz.ingest.recording_files import RecordingFiles
     from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.pipeline.stage_runner import RunStore
     from frf_ipz.pipeline.stages import causes, hints, modelling, outputs
     from frf_ipz.progress import Progress
 else:
+    RecordingFiles = import_late("frf_ipz.ingest.recording_files", "RecordingFiles")
     causes = import_late("frf_ipz.pipeline.stages.causes")
     hints = import_late("frf_ipz.pipeline.stages.hints")
     modelling = import_late("frf_ipz.pipeline.stages.modelling")
@@ -54,7 +56,7 @@ def chain(
     str
         The name of each stage when it is done.
     """
-    runner = StageRunner(inputs=inputs, store=store, progress=progress)
+    runner = StageRunner(inputs=inputs, recordings=RecordingFiles(test=inputs.test), store=store, progress=progress)
     recordings = measurement.ingest(runner)
     yield "ingest"
     frfs, model = recordings.frfs, inputs.fe_model

@@ -13,6 +13,7 @@ from frf_ipz.runs.software import software
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from frf_ipz.ingest.recording_files import RecordingFiles
     from frf_ipz.pipeline.inputs import PipelineInputs
     from frf_ipz.progress import Progress
     from frf_ipz.runs.folder import RunFolder, Writers
@@ -46,6 +47,8 @@ class StageRunner:
     ----------
     inputs : PipelineInputs
         What to work on.
+    recordings : RecordingFiles
+        Those of the test: what one stage has read and found in them, the others need not read and find again.
     store : RunFolder or RunMemory
         Where results are kept.
     progress : Progress
@@ -55,6 +58,7 @@ class StageRunner:
     """
 
     inputs: PipelineInputs
+    recordings: RecordingFiles
     store: RunStore
     progress: Progress
     keys: dict[str, str] = field(default_factory=dict)

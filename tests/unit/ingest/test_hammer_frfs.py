@@ -9,6 +9,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.records import read_records
 from frf_ipz.ingest.survey.file_index import CELL
 from synthetic_campaign import HIT, Structure, hammer_campaign, impact, pulse, write_csv, write_test
@@ -214,7 +215,7 @@ def test_offset_is_seen_beside_the_ringing_of_a_filter_before_a_strong_impact(tm
     if step:
         signals = step * np.round(signals / step)
     write_csv(tmp_path / "hits" / "p_0.csv", signals, 1 / 2048)
-    (record,) = read_records(read_test(write_test(tmp_path, HIT)), IngestOptions())
+    (record,) = read_records(RecordingFiles(test=read_test(write_test(tmp_path, HIT))), IngestOptions())
     removed = signals[1:, :1] - record.responses[:, :1]
     scatter = np.hypot(noise, step / np.sqrt(12)) / np.sqrt(n_before)
     np.testing.assert_allclose(removed, offset[1:], rtol=0, atol=4 * scatter)  # a false alarm in some 10 000
@@ -228,7 +229,7 @@ def test_motion_from_the_impact_before_is_no_offset(tmp_path):
         heights += pulse(len(heights), step_s, at_s=start * step_s)
     signals = impact(RINGING, force=heights, step_s=step_s)
     write_csv(tmp_path / "hits" / "all.csv", signals + offsets, step_s)
-    records = list(read_records(read_test(write_test(tmp_path, HIT)), IngestOptions()))
+    records = list(read_records(RecordingFiles(test=read_test(write_test(tmp_path, HIT))), IngestOptions()))
     assert len(records) == 3
     start = len(heights) - sum(record.n_samples for record in records)
     for record in records:

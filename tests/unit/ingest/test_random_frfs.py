@@ -7,6 +7,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.records import read_records
 from frf_ipz.ingest.signals.clipping import is_clipped
 from frf_ipz.ingest.signals.periods import find_period
@@ -216,7 +217,7 @@ def test_segments_that_cannot_be_are_refused(tmp_path, segment_s):
 
 def test_records_can_be_read_whole(tmp_path):
     signals = from_rest(np.random.default_rng(9), 8192)
-    (record,) = read_records(read_test(write(tmp_path, [signals])), IngestOptions())
+    (record,) = read_records(RecordingFiles(test=read_test(write(tmp_path, [signals]))), IngestOptions())
     assert record.starts_at_rest
     np.testing.assert_allclose(record.force, signals[0], rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(record.responses, signals[1:], rtol=1e-12, atol=1e-12)

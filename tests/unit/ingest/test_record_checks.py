@@ -8,6 +8,7 @@ from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.records import read_records
 from frf_ipz.ingest.signals.pulses import force_band
 from synthetic_campaign import HIT, Structure, hammer_campaign, impact, pulse, write_csv, write_test
@@ -260,8 +261,9 @@ def test_forces_in_coarse_digital_steps_are_not_clipped(tmp_path, step_N):
 
 def test_all_records_can_be_read_the_bad_ones_flagged(tmp_path):
     test = read_test(campaign(tmp_path, clipped))
-    records = list(read_records(test, IngestOptions(), used_only=False))
-    used = list(read_records(test, IngestOptions()))
+    files = RecordingFiles(test=test)
+    records = list(read_records(files, IngestOptions(), used_only=False))
+    used = list(read_records(files, IngestOptions()))
     assert [record.used for record in records] == [True, True, False]
     assert [record.name for record in used] == [record.name for record in records[:2]]
     assert "clipping" in records[2].marks[0]
@@ -278,7 +280,7 @@ def test_frfs_of_others_have_no_records(tmp_path):
     )
     path = write_test(tmp_path, '[[frf]]\nfile = "frf.csv"\nquantity = "accelerance"\n', kind="frf")
     with pytest.raises(InputError, match="has no recordings"):
-        list(read_records(read_test(path), IngestOptions()))
+        list(read_records(RecordingFiles(test=read_test(path)), IngestOptions()))
 
 
 def test_rest_before_an_impact_in_coarse_digital_steps_is_no_dropout(tmp_path):

@@ -8,6 +8,7 @@ import pytest
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.recording_files import RecordingFiles
 from frf_ipz.ingest.records import read_records
 from synthetic_campaign import HIT, Structure, hammer_campaign, impact, pulse, write_csv, write_test
 
@@ -48,7 +49,7 @@ def test_impacts_of_one_long_file_are_read_one_at_a_time(tmp_path, monkeypatch):
         force += pulse(len(force), STEP_S, at_s=start * STEP_S)
     write_csv(tmp_path / "hits" / "all.csv", impact(Structure(), force=force), STEP_S)
     test = read_test(write_test(tmp_path, HIT))
-    records = read_records(test, IngestOptions())
+    records = read_records(RecordingFiles(test=test), IngestOptions())
     first = next(records)
     assert (first.name, first.n_samples) == ("hits/all.csv#1", pytest.approx(2048, abs=64))
     assert sum(1 for _ in records) == 19

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeAlias
+from itertools import accumulate
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -20,15 +21,18 @@ from frf_ipz.diagnosis.model.modes import (
     modify_structure,
     scatter_modes,
 )
-from frf_ipz.diagnosis.model.nuisance import NuisancePrior
+from frf_ipz.diagnosis.model.nuisance import NuisancePrior, NuisanceValues
 from frf_ipz.diagnosis.model.response import Response, respond
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from frf_ipz.diagnosis.catalogue.effect import Builder, Effect, Parameter
     from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.location import Location
 
 
+Remembered = TypeVar("Remembered")
 ComponentKey: TypeAlias = "tuple[str, Location]"
 N_REMEMBERED = 4  # sets of values
 
@@ -93,6 +97,7 @@ class Hypothesis:
     nuisance_prior: NuisancePrior
     deadline: Deadline = NO_LIMIT
     _latest: dict[bytes, ModifiedStructure] = field(init=False, default_factory=dict, repr=False)
+    _latest_nuisance: dict[bytes, NuisanceValues] = field(init=False, default_factory=dict, repr=False)
 
     @property
     def key(self) -> tuple[ComponentKey, ...]:
@@ -153,26 +158,36 @@ class Hypothesis:
         )
 
     def _split(self, values: FloatArray) -> list[FloatArray]:
-        return np.split(values, np.cumsum(self.counts)[:-1]) if self.counts else []
+        stops = list(accumulate(self.counts))
+        return [values[stop - count : stop] for stop, count in zip(stops, self.counts, strict=True)]
 
     def modes(self, values: FloatArray, nuisance: FloatArray) -> Modes:
         """Modes for physical values of the parameters, and nuisance parameters in standard deviations."""
-        return scatter_modes(self.basis, self._modified(values), self.rows, self.nuisance_prior.unpack(nuisance))
+        return scatter_modes(self.basis, self._modified(values), self.rows, self._unpacked(nuisance))
 
     def respond(self, values: FloatArray, nuisance: FloatArray, s: ComplexArray) -> Response:
         """FRFs for physical values of the parameters, and nuisance parameters in standard deviations."""
-        modified, nuisance_values = self._modified(values), self.nuisance_prior.unpack(nuisance)
+        modified, nuisance_values = self._modified(values), self._unpacked(nuisance)
         modes = scatter_modes(self.basis, modified, self.rows, nuisance_values)
         return respond(modes, modified.change, self.context.layout, nuisance_values, s, self.basis)
 
     def _modified(self, values: FloatArray) -> ModifiedStructure:
         """Solve without scatter, once for the latest values: a fit tries several nuisance values with the same."""
-        key = values.tobytes()
-        if key not in self._latest:
-            if len(self._latest) >= N_REMEMBERED:
-                self._latest.pop(next(iter(self._latest)))
-            self._latest[key] = modify_structure(self.basis, self.change(values))
-        return self._latest[key]
+        return _remember(self._latest, values, lambda: modify_structure(self.basis, self.change(values)))
+
+    def _unpacked(self, nuisance: FloatArray) -> NuisanceValues:
+        """Unpack once for the latest nuisance: derivatives by parameters are all taken with the same."""
+        return _remember(self._latest_nuisance, nuisance, lambda: self.nuisance_prior.unpack(nuisance))
+
+
+def _remember(latest: dict[bytes, Remembered], values: FloatArray, compute: Callable[[], Remembered]) -> Remembered:
+    """Give what belongs to values, computed where it is not among the latest."""
+    key = values.tobytes()
+    if key not in latest:
+        if len(latest) >= N_REMEMBERED:
+            latest.pop(next(iter(latest)))
+        latest[key] = compute()
+    return latest[key]
 
 
 def make_hypothesis(

@@ -174,7 +174,7 @@ def differentiate_by_nuisance(
     WhitenedSlopes or InterpolatedSlopes
         Per standard deviation of each parameter.
     """
-    if nuisance_prior.size <= 2 * _count_sums(nuisance_prior) + 1:  # fewer than the sums that would show the functions
+    if nuisance_prior.size <= 2 * _count_sums(nuisance_prior):  # few beside the sums that would show the functions
         return WhitenedSlopes(data.slopes(response, nuisance_jacobian(response, nuisance_prior, layout)))
     return interpolate_slopes(data, response, nuisance_prior, layout)
 
@@ -201,7 +201,7 @@ def interpolate_slopes(
         Per standard deviation of each parameter.
     """
     points, functions = choose_points(response, nuisance_prior, data.measured.size)
-    jacobian = nuisance_jacobian(_receptances_at(response, points), nuisance_prior, layout)
+    jacobian = nuisance_jacobian(response.receptances_at(points), nuisance_prior, layout)
     gains = data.gains(response)
     directions, columns = [], []
     for frf, factor in enumerate(data.whitening.factors):
@@ -241,8 +241,9 @@ def choose_points(response: Response, nuisance_prior: NuisancePrior, size: Float
         What a derivative of 1 at one of these points and 0 at the others is everywhere.
     """
     weights = np.mean(np.abs(response.chain) / size, axis=1)[:, None]
-    sums = weights * _sum_products(response, nuisance_prior)
-    sums /= np.linalg.norm(sums, axis=0)
+    sums = np.zeros((len(weights), _count_sums(nuisance_prior)), np.complex128)
+    for part in _sum_products(response, nuisance_prior):
+        sums += weights * part / np.linalg.norm(weights * part, axis=0)
     basis, triangle, _ = linalg.qr(sums, mode="economic", pivoting=True, check_finite=False)
     remaining = np.abs(np.diag(triangle))
     basis = basis[:, : np.count_nonzero(remaining > ACCURACY * remaining[0])]
@@ -252,8 +253,11 @@ def choose_points(response: Response, nuisance_prior: NuisancePrior, size: Float
     return points, np.asarray(functions * weights[points, 0] / weights)
 
 
-def _sum_products(response: Response, nuisance_prior: NuisancePrior) -> ComplexArray:
-    """Sum products of modal motions, and motions, with arbitrary coefficients; each column is one sum."""
+def _sum_products(response: Response, nuisance_prior: NuisancePrior) -> tuple[ComplexArray, ...]:
+    """Sum products of modal motions, and motions, with arbitrary coefficients, beside a constant; each column is a sum.
+
+    All are of the same few functions, so one column may add one of each.
+    """
     m, n_points, s = nuisance_prior.n_modes, len(response.s), response.s[:, None]
     stiffness = np.maximum(response.modes.omega[:m], np.abs(s).min())[:, None]  # what a change acts on a motion by
     outputs = (stiffness * response.output_motion[:, :m]).reshape(n_points, -1)
@@ -263,7 +267,7 @@ def _sum_products(response: Response, nuisance_prior: NuisancePrior) -> ComplexA
     products = (outputs @ _coefficients(outputs.shape[1], count)) * (inputs @ _coefficients(inputs.shape[1], count))
     motions = np.concatenate([response.output_motion, response.input_motion], axis=2).reshape(n_points, -1)
     all_motions = motions @ _coefficients(motions.shape[1], count)
-    return np.hstack([products * powers, all_motions, np.ones((n_points, 1))])
+    return tuple(np.asarray(part, np.complex128) for part in (products * powers, all_motions, np.ones((n_points, 1))))
 
 
 def _count_sums(nuisance_prior: NuisancePrior) -> int:
@@ -274,21 +278,6 @@ def _count_sums(nuisance_prior: NuisancePrior) -> int:
 def _coefficients(n_terms: int, n_sums: int) -> FloatArray:
     """Give arbitrary coefficients, the same ones always."""
     return np.random.default_rng(n_terms).standard_normal((n_terms, n_sums))
-
-
-def _receptances_at(response: Response, points: IntArray) -> Response:
-    """Give the receptances of a response at some points of its contour."""
-    chain = response.chain[points]
-    return replace(
-        response,
-        values=response.values[points] / chain,
-        output_motion=response.output_motion[points],
-        input_motion=response.input_motion[points],
-        chain=np.ones_like(chain),
-        s=response.s[points],
-        attached_motion=response.attached_motion[points],
-        attached_stiffness=response.attached_stiffness[points],
-    )
 
 
 def _along(directions: ComplexArray, values: ComplexArray) -> FloatArray:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import blas
 from scipy.ndimage import median_filter
 
 from frf_ipz.arrays import ComplexArray, FloatArray
@@ -190,7 +191,12 @@ def _as_transfer_functions(
 
 def _noise_covariance(survey: FrfSurvey, weights: ComplexArray) -> ComplexArray:
     """Covariance by the errors of the lines, (n_frfs, n_points, n_points)."""
-    return np.array([(weights * column) @ weights.conj().T for column in survey.variance.T])
+    covariance = np.empty((survey.variance.shape[1], len(weights), len(weights)), np.complex128)
+    for of_frf, column in zip(covariance, survey.variance.T, strict=True):
+        scaled = weights * np.sqrt(column)
+        upper = np.triu(blas.zherk(1.0, scaled.T, trans=2)).conj()  # one half: the product of a matrix with itself
+        of_frf[...] = upper + np.triu(upper, 1).conj().T
+    return covariance
 
 
 def _within_reach(survey: FrfSurvey, s: ComplexArray, *, include_ends: bool = False) -> ComplexArray:

@@ -68,6 +68,14 @@ class Basis:
     highest_rad_s: float
     measured: tuple[AnyDof, ...]
     _projected: dict[int, tuple[Matrix, FloatArray]] = field(init=False, default_factory=dict, repr=False)
+    _nominal_modes: list[tuple[FloatArray, FloatArray]] = field(init=False, default_factory=list, repr=False)
+
+    @property
+    def nominal_modes(self) -> tuple[FloatArray, FloatArray]:
+        """Modes of the nominal model, as `solve_changed_modes` gives them: solved for once."""
+        if not self._nominal_modes:
+            self._nominal_modes.append(solve_modes(self.stiffness, np.eye(len(self.stiffness)), self.modes.shift))
+        return self._nominal_modes[0]
 
     @property
     def loaded_shapes(self) -> FloatArray:
@@ -204,10 +212,7 @@ def _exchanged(model: StructuralModel, highest_rad_s: float, measured: tuple[Any
 
 
 def solve_changed_modes(basis: Basis, change: Change) -> tuple[FloatArray, FloatArray]:
-    """Solve for the modes of a modified structure.
-
-    The inverse problem is solved: the low modes keep all their digits beside static shapes with frequencies a thousand
-    times theirs, and derivatives by differences need them. A structure that a change makes unstable has no inverse.
+    """Solve for the modes of a modified structure; where mass and stiffness stay, those of the nominal model.
 
     Parameters
     ----------
@@ -223,11 +228,35 @@ def solve_changed_modes(basis: Basis, change: Change) -> tuple[FloatArray, Float
     vectors : (q, q) array
         Columns are modes in terms of the basis, mass-normalised.
     """
+    if change.stiffness is None and change.mass is None:
+        return basis.nominal_modes
     stiffness = basis.stiffness if change.stiffness is None else basis.stiffness + basis.project(change.stiffness)
     mass = np.eye(len(stiffness))
     if change.mass is not None:
         mass = mass + basis.project(change.mass)
-    shift = basis.modes.shift
+    return solve_modes(stiffness, mass, basis.modes.shift)
+
+
+def solve_modes(stiffness: FloatArray, mass: FloatArray, shift: float) -> tuple[FloatArray, FloatArray]:
+    """Solve for modes by the inverse problem.
+
+    The low modes keep all their digits beside static shapes with frequencies a thousand times theirs, and derivatives
+    by differences need them. A structure that a change makes unstable has no inverse.
+
+    Parameters
+    ----------
+    stiffness, mass : (q, q) array
+        In the coordinates of a basis.
+    shift : float
+        Times the mass it is added to the stiffness, (rad/s)^2: rigid-body modes have none.
+
+    Returns
+    -------
+    squares : (q,) array
+        Squared frequencies, ascending, (rad/s)^2.
+    vectors : (q, q) array
+        Columns are modes, mass-normalised.
+    """
     try:
         inverses, vectors = generalised_eigh(mass, stiffness + shift * mass)
     except linalg.LinAlgError:

@@ -7,14 +7,16 @@ inversion lemma.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from frf_ipz.diagnosis.model.basis import Basis
     from frf_ipz.diagnosis.model.change import Change
     from frf_ipz.diagnosis.model.layout import Layout
@@ -23,8 +25,44 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModalStiffness:
+    """Dynamic stiffness of modes, without attachments.
+
+    Parameters
+    ----------
+    diagonal : (n_points, q) complex array
+        Of each mode.
+    coupling : (n_points, q, q) complex array, optional
+        What damping couples them by.
+    """
+
+    diagonal: ComplexArray
+    coupling: ComplexArray | None
+
+    def at(self, points: IntArray) -> ModalStiffness:
+        """Give the dynamic stiffness at some points of the contour, by an (n,) int array."""
+        coupling = None if self.coupling is None else self.coupling[points]
+        return ModalStiffness(diagonal=self.diagonal[points], coupling=coupling)
+
+    def move(self, loads: FloatArray) -> ComplexArray:
+        """Give the modal motion under loads, (n_loads, q): (n_points, q, n_loads) complex array."""
+        if self.coupling is None:
+            return np.asarray(loads.T[None] / self.diagonal[:, :, None])
+        dynamic = self.coupling + self.diagonal[:, :, None] * np.eye(self.diagonal.shape[1])
+        loads_everywhere = np.broadcast_to(loads.T, (len(dynamic), *loads.T.shape))
+        return np.asarray(np.linalg.solve(dynamic, loads_everywhere), np.complex128)
+
+    def receptances(self, motions: FloatArray, loads: FloatArray) -> ComplexArray:
+        """Give motions, (n_motions, q), under loads, (n_loads, q): (n_points, n_motions, n_loads) complex array."""
+        if self.coupling is not None:
+            return np.asarray(motions @ self.move(loads))
+        products = (motions[:, None] * loads).reshape(-1, motions.shape[1])  # for all, without the modes' motion
+        return (1 / self.diagonal @ products.T).reshape(len(self.diagonal), len(motions), len(loads))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Response:
-    """FRFs, and the modal motions that they are made of.
+    """FRFs, and what the modal motions that they are made of follow from.
 
     Parameters
     ----------
@@ -32,26 +70,69 @@ class Response:
         SI, in the quantities of the FRFs, as the channels record them.
     modes : Modes
         The modes.
-    output_motion, input_motion : (n_points, q, n) complex array
-        Modal motion for unit forces at sensors and excited points, attachments included.
+    outputs, inputs, attached : (n, q) array
+        Modal shapes at sensors, at excited points and where something is attached.
+    stiffness : ModalStiffness
+        Of the modes, without attachments.
+    attached_stiffness : (n_points, n, n) complex array
+        Forces on the structure where something is attached, per motion that it would have without attachments.
     chain : (n_points, n_frfs) complex array
         Factor from receptance to the measured quantity.
     s : (n_points,) complex array
         rad/s.
-    attached_motion : (n_points, q, n) complex array
-        Modal motion for unit forces where something is attached, without attachments.
-    attached_stiffness : (n_points, n, n) complex array
-        Forces on the structure there per motion that it would have without attachments.
     """
 
     values: ComplexArray
     modes: Modes
-    output_motion: ComplexArray
-    input_motion: ComplexArray
+    outputs: FloatArray
+    inputs: FloatArray
+    attached: FloatArray
+    stiffness: ModalStiffness
+    attached_stiffness: ComplexArray
     chain: ComplexArray
     s: ComplexArray
-    attached_motion: ComplexArray
-    attached_stiffness: ComplexArray
+    _motions: dict[str, ComplexArray] = field(init=False, default_factory=dict, repr=False)
+
+    @property
+    def output_motion(self) -> ComplexArray:
+        """Modal motion for unit forces at sensors, attachments included, (n_points, q, n_outputs) complex array."""
+        return self._remember("outputs", self._move_with_attachments, self.outputs)
+
+    @property
+    def input_motion(self) -> ComplexArray:
+        """Modal motion for unit forces at excited points, attachments included, (n_points, q, n_inputs)."""
+        return self._remember("inputs", self._move_with_attachments, self.inputs)
+
+    @property
+    def attached_motion(self) -> ComplexArray:
+        """Modal motion for unit forces where something is attached, without attachments, (n_points, q, n)."""
+        return self._remember("attached", self.stiffness.move, self.attached)
+
+    def receptances_at(self, points: IntArray) -> Response:
+        """Give the receptances at some points of the contour, by an (n,) int array: in the place of FRFs."""
+        chain = self.chain[points]
+        some = replace(
+            self,
+            values=self.values[points] / chain,
+            stiffness=self.stiffness.at(points),
+            attached_stiffness=self.attached_stiffness[points],
+            chain=np.ones_like(chain),
+            s=self.s[points],
+        )
+        some._motions.update({name: motion[points] for name, motion in self._motions.items()})
+        return some
+
+    def _move_with_attachments(self, loads: FloatArray) -> ComplexArray:
+        motion = self.stiffness.move(loads)
+        if not len(self.attached):
+            return motion
+        return motion - self.attached_motion @ (self.attached_stiffness @ (self.attached @ motion))
+
+    def _remember(self, name: str, move: Callable[[FloatArray], ComplexArray], loads: FloatArray) -> ComplexArray:
+        """Solve for motions when they are first asked for: FRFs alone do not need them."""
+        if name not in self._motions:
+            self._motions[name] = move(loads)
+        return self._motions[name]
 
 
 def respond(
@@ -81,29 +162,27 @@ def respond(
     """
     outputs = modes.outputs + _shift(nuisance_values.output_shift, modes.output_shifts)
     inputs = modes.inputs + _shift(nuisance_values.input_shift, modes.input_shifts)
-    n_outputs = len(outputs)
     motions = [attachment.motions for attachment in change.attachments]
     attached = np.hstack(motions).T @ basis.vectors @ modes.vectors if motions else np.zeros((0, len(modes.omega)))
-    loads = np.concatenate([outputs, inputs, attached])
-    motion = _solve(modes, _modulus(change, modes, s), loads, s)
-    attached_motion = motion[:, :, n_outputs + len(inputs) :]
-    stiffness = _coupled_stiffness(attached_motion, attached, change, s)
+    stiffness = _modal_stiffness(modes, _modulus(change, modes, s), s)
+    attached_stiffness = _coupled_stiffness(stiffness.receptances(attached, attached), change, s)
+    receptance = stiffness.receptances(outputs, inputs)
     if motions:
-        motion = motion - np.matmul(attached_motion, np.matmul(stiffness, np.matmul(attached, motion)))
-    output_motion, input_motion = motion[:, :, :n_outputs], motion[:, :, n_outputs : n_outputs + len(inputs)]
-    receptance = np.matmul(outputs, input_motion)[:, layout.output_index, layout.input_index] + nuisance_values.local
+        free_motion = stiffness.receptances(attached, inputs)
+        receptance = receptance - stiffness.receptances(outputs, attached) @ (attached_stiffness @ free_motion)
     chain = (
         s[:, None] ** layout.power * _channels(change, layout, s) * np.exp(layout.gain_signs @ nuisance_values.gains)
     )
     return Response(
-        values=receptance * chain,
+        values=(receptance[:, layout.output_index, layout.input_index] + nuisance_values.local) * chain,
         modes=modes,
-        output_motion=output_motion,
-        input_motion=input_motion,
+        outputs=outputs,
+        inputs=inputs,
+        attached=attached,
+        stiffness=stiffness,
+        attached_stiffness=attached_stiffness,
         chain=chain,
         s=s,
-        attached_motion=attached_motion,
-        attached_stiffness=stiffness,
     )
 
 
@@ -123,21 +202,16 @@ def _modulus(change: Change, modes: Modes, s: ComplexArray) -> ComplexArray:
     return np.asarray(np.hypot(1, loss) * (s[:, None] / middle) ** (2 / np.pi * np.arctan(loss)))
 
 
-def _solve(modes: Modes, modulus: ComplexArray, loads: FloatArray, s: ComplexArray) -> ComplexArray:
-    """Modal motion under loads, (n_points, q, n_loads)."""
+def _modal_stiffness(modes: Modes, modulus: ComplexArray, s: ComplexArray) -> ModalStiffness:
     damping = 2 * modes.ratio * np.sqrt(np.abs(modes.squares))
-    denominators = s[:, None] ** 2 + s[:, None] * damping + modulus * modes.squares
-    if modes.viscous is None:
-        return np.asarray(loads.T[None] / denominators[:, :, None])
-    dynamic = s[:, None, None] * modes.viscous + denominators[:, :, None] * np.eye(len(damping))
-    return np.asarray(np.linalg.solve(dynamic, np.broadcast_to(loads.T, (len(s), *loads.T.shape))), np.complex128)
+    diagonal = s[:, None] ** 2 + s[:, None] * damping + modulus * modes.squares
+    coupling = None if modes.viscous is None else s[:, None, None] * modes.viscous
+    return ModalStiffness(diagonal=diagonal, coupling=coupling)
 
 
-def _coupled_stiffness(
-    attached_motion: ComplexArray, attached: FloatArray, change: Change, s: ComplexArray
-) -> ComplexArray:
-    """D (1 + R D)^-1 of all attachments, (n_points, n, n)."""
-    n = len(attached)
+def _coupled_stiffness(receptance: ComplexArray, change: Change, s: ComplexArray) -> ComplexArray:
+    """D (1 + R D)^-1 of all attachments, (n_points, n, n); R is the receptance where they are attached."""
+    n = receptance.shape[1]
     if n == 0:
         return np.zeros((len(s), 0, 0), complex)
     stiffness = np.concatenate(
@@ -147,8 +221,8 @@ def _coupled_stiffness(
         ],
         axis=1,
     )
-    inner = np.eye(n) + stiffness[:, :, None] * np.matmul(attached, attached_motion)
-    return np.linalg.solve(inner, stiffness[:, :, None] * np.eye(n))
+    inner = np.eye(n) + stiffness[:, :, None] * receptance
+    return np.asarray(np.linalg.solve(inner, stiffness[:, :, None] * np.eye(n)), np.complex128)
 
 
 def _channels(change: Change, layout: Layout, s: ComplexArray) -> ComplexArray:

@@ -293,20 +293,24 @@ def _quotient_misfit(force: ComplexArray, motion: ComplexArray, energies: FloatA
 def _quotient_misfit_of(
     degrees: tuple[int, int], force: ComplexArray, motion: ComplexArray, energies: FloatArray
 ) -> float:
-    """Least misfit of all rounds over the expected one; it may oscillate where a pole comes onto a line."""
+    """Least misfit of all rounds over the expected one; it may oscillate where a pole comes onto a line.
+
+    Each record has a transient of its own, a polynomial: what these can explain is projected out record by record.
+    """
     (n_records, n_lines), (poles, zeros) = motion.shape, degrees
     above = np.linspace(-1, 1, n_lines)[:, None] ** np.arange(zeros + 1)
     below = above[:, 1 : poles + 1]
-    common = np.concatenate([-below * motion[..., None], above * force[..., None]], 2).reshape(n_records * n_lines, -1)
-    columns = np.hstack([common, np.kron(np.eye(n_records), above)])
+    sides = np.concatenate([-below * motion[..., None], above * force[..., None], motion[..., None]], axis=2)
     denominator, frf = np.ones(n_lines, complex), np.zeros(n_lines, complex)
     least = np.inf
     for _ in range(ROUNDS):
-        weight = (1 / (np.sqrt(_variance(motion, frf, energies)) * np.abs(denominator))).ravel()
-        weighted = np.asarray(columns * weight[:, None], np.complex128)
-        coefficients = solve_scaled_columns(weighted, np.asarray(motion.ravel() * weight, np.complex128), CUT)
+        weight = 1 / (np.sqrt(_variance(motion, frf, energies)) * np.abs(denominator))
+        smooth, weighted = np.linalg.qr(weight[..., None] * above)[0], weight[..., None] * sides
+        rough = (weighted - smooth @ (smooth.swapaxes(1, 2) @ weighted)).reshape(motion.size, -1)
+        columns, right = rough[:, :-1], rough[:, -1]
+        coefficients = solve_scaled_columns(columns, right, CUT)
         denominator = 1 + below @ coefficients[:poles]
-        frf = (above @ coefficients[poles : poles + zeros + 1]) / denominator
-        misfit = (motion.ravel() - columns @ coefficients).reshape(motion.shape) / denominator
+        frf = (above @ coefficients[poles:]) / denominator
+        misfit = (right - columns @ coefficients).reshape(motion.shape) / (weight * denominator)
         least = min(least, float(np.sum(np.abs(misfit) ** 2 / _variance(motion, frf, energies))))
-    return float(least / (motion.size - columns.shape[1]))
+    return float(least / (motion.size - columns.shape[1] - n_records * (zeros + 1)))

@@ -36,9 +36,11 @@ from frf_ipz.diagnosis.search.robust_refinement import GAIN, REFINED_ERROR, refi
 if TYPE_CHECKING:
     from collections.abc import Container, Iterable
 
+    from frf_ipz.diagnosis.catalogue.effect import Effect
     from frf_ipz.diagnosis.evidence.fit import Data, Fit
     from frf_ipz.diagnosis.evidence.hypothesis import Component, ComponentKey
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
+    from frf_ipz.diagnosis.search.robust_refinement import Start
 
 N_DISTANT = 8  # locations anywhere, no neighbours of each other, by the cost of a global scan
 EQUAL_COST_RATIO = 1.1  # times the best cost there: locations as good as the best, though they may be its neighbours
@@ -73,7 +75,7 @@ def add_distant_candidates(problem: InferenceProblem, ranking: Ranking, fits: Fi
     """
     best = ranking.best
     effect = best.hypothesis.components[-1].effect
-    starts = scan_globally(replace(problem, effects={effect.name: effect}), ranking.base)
+    starts = _scan_effect(problem, ranking, effect)
     equal = [start for start in starts[:MAX_EQUAL] if start.cost < EQUAL_COST_RATIO * starts[0].cost]
     for start in (*equal, *select_apart(starts, N_DISTANT)):
         if start.component.key not in fits:
@@ -82,6 +84,12 @@ def add_distant_candidates(problem: InferenceProblem, ranking: Ranking, fits: Fi
     if max(fit.log_evidence for fit in fits.values()) > best.log_evidence + GAIN:
         search_neighbourhoods(problem, ranking.base, fits, 1)
     return len(starts)
+
+
+def _scan_effect(problem: InferenceProblem, ranking: Ranking, effect: Effect) -> list[Start]:
+    """Scan one effect, if the search has not: of each it scanned all locations by themselves."""
+    known = [start for start in ranking.scanned if start.component.effect.name == effect.name]
+    return known or scan_globally(replace(problem, effects={effect.name: effect}), ranking.base)
 
 
 def find_next_neighbour(
@@ -313,7 +321,7 @@ def fit_distant_locations(problem: InferenceProblem, ranking: Ranking) -> Rankin
     """
     best, base = ranking.best, ranking.base
     effect = best.hypothesis.components[-1].effect
-    starts = scan_globally(replace(problem, effects={effect.name: effect}), base)
+    starts = _scan_effect(problem, ranking, effect)
     fits: Fits = {fit.hypothesis.components[-1].key: fit for fit in ranking.fits}
     weights = compute_weights(problem.coarse, REFINED_ERROR)
     for start in [start for start in starts if start.component.key not in fits][:N_FITTED]:

@@ -64,8 +64,8 @@ class Ranking:
         Each with one more component, by falling evidence.
     n_tried : int
         Number of hypotheses that were scanned.
-    refined : tuple of Start
-        Refined starts of a global scan, by rising cost; empty where none was made.
+    scanned, refined : tuple of Start
+        Starts of a global scan, and refined ones, by rising cost; empty where none was made.
     is_complete : bool
         False where the time was over before all was tried.
     """
@@ -73,6 +73,7 @@ class Ranking:
     base: Fit
     fits: tuple[Fit, ...]
     n_tried: int
+    scanned: tuple[Start, ...] = ()
     refined: tuple[Start, ...] = ()
     is_complete: bool = True
 
@@ -133,13 +134,13 @@ def search_component(problem: InferenceProblem, base: Fit) -> Ranking:
     DeadlineError
         If there was time for none.
     """
-    n_tried, refined, is_complete = 0, list[Start](), True
+    n_tried, scanned, refined, is_complete = 0, list[Start](), list[Start](), True
     fits: Fits = {}
     try:
         if not base.explains_nearly_all:
-            starts = scan_globally(problem, base)
-            n_tried += len(starts)
-            refined = refine_starts(problem, base, starts)
+            scanned = scan_globally(problem, base)
+            n_tried += len(scanned)
+            refined = refine_starts(problem, base, scanned)
             _fit_starts(problem, base, refined, fits)
             if all(fit.is_far_off for fit in fits.values()):
                 _add_beside_nuisance(problem, base, fits)
@@ -156,6 +157,7 @@ def search_component(problem: InferenceProblem, base: Fit) -> Ranking:
         base=base,
         fits=ranked,
         n_tried=n_tried,
+        scanned=tuple(scanned),
         refined=tuple(refined),
         is_complete=is_complete,
     )

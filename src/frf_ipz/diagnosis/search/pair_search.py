@@ -33,6 +33,7 @@ from frf_ipz.diagnosis.search.robust_refinement import (
     GAIN,
     LOCATIONS_PER_EFFECT,
     N_STEPPED,
+    NEIGHBOURHOOD,
     REFINED_ERROR,
     Start,
     refine,
@@ -117,7 +118,21 @@ def _search_other_firsts(problem: InferenceProblem, first: Ranking, best: Fit, c
         search_small_component(problem, alternative, PROMISED_PART * (best.log_evidence - alternative.log_evidence))
         for alternative in firsts
     ]
-    return [_reposition(problem, pairs) if _is_competitive(pairs.best, best) else pairs for pairs in rankings]
+    return [
+        _reposition(problem, pairs)
+        if _is_competitive(pairs.best, best) and not _was_searched_beside(pairs.best, first.best)
+        else pairs
+        for pairs in rankings
+    ]
+
+
+def _was_searched_beside(pair: Fit, single: Fit) -> bool:
+    """Tell whether a pair has the one component of a fit that is not far off, or nearly: all were tried beside that."""
+    known = single.hypothesis.components[-1]
+    return not single.is_far_off and any(
+        component.effect.name == known.effect.name and component.location.is_near(known.location, NEIGHBOURHOOD)
+        for component in pair.hypothesis.components
+    )
 
 
 def _is_competitive(pair: Fit, best: Fit) -> bool:

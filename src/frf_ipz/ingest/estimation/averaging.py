@@ -123,7 +123,7 @@ def average_recordings(
     averages = {setup: SetupAverage(empty_sums(n_lines, n_outputs), np.zeros(n_outputs)) for setup in test.setups}
     energies: list[float] = []
     traces: tuple[Trace, ...] = ()
-    records = read_records(test, options, survey=survey, files=files, used_only=False)
+    records = read_records(files, options, used_only=False)
     for position, (info, record) in enumerate(zip(survey.records, records, strict=True)):
         fraction = position / len(survey.records)
         progress(SURVEY_SHARE + (1.0 - SURVEY_SHARE) * fraction, f"averaging {record.name}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 from frf_ipz.pipeline.stage_runner import StageRunner
@@ -49,7 +49,7 @@ def predict_with_causes(
         return None
 
     def compute(progress: Progress) -> Prediction:
-        apart = StageRunner(inputs=runner.inputs, store=RunMemory(), progress=progress, keys=dict(runner.keys))
+        apart = replace(runner, store=RunMemory(), progress=progress, keys=dict(runner.keys))
         corrected, corrected_frfs = mismatch.apply_diagnosis(apart, model, frfs, diagnosis)
         fit = measurement.fit(apart, corrected_frfs, corrected_by=diagnosis)
         reduced = modelling.reduce(apart, corrected, fit, corrected_by=diagnosis)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from frf_ipz.export import run_tables as tables
 from frf_ipz.export.parquet import write_table
 from frf_ipz.frf import FrfSet
-from frf_ipz.ingest.estimate import estimate_frfs
+from frf_ipz.ingest.estimate import estimate_from
 from frf_ipz.late_imports import import_late
 from frf_ipz.pipeline.stages.mismatch import corrections
 from frf_ipz.rational import without_window
@@ -49,7 +49,7 @@ def ingest(runner: StageRunner) -> FrfEstimate:
     return runner.stage(
         "ingest",
         {"options": asdict(options), "test": repr(runner.inputs.test), "files": files},
-        lambda progress: estimate_frfs(runner.inputs.test, options=options, progress=progress),
+        lambda progress: estimate_from(runner.recordings, options, progress),
         _files_of_ingest,
     )
 

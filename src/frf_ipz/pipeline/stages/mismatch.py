@@ -30,14 +30,14 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.apply import correct_frfs, correct_model
     from frf_ipz.diagnosis.diagnose import find_causes
     from frf_ipz.diagnosis.measured.levels import compare_frf_levels, compare_levels
-    from frf_ipz.diagnosis.observations import observe
+    from frf_ipz.diagnosis.observations import observe_from
 else:
     correct_frfs = import_late("frf_ipz.diagnosis.apply", "correct_frfs")
     correct_model = import_late("frf_ipz.diagnosis.apply", "correct_model")
     find_causes = import_late("frf_ipz.diagnosis.diagnose", "find_causes")
     compare_frf_levels = import_late("frf_ipz.diagnosis.measured.levels", "compare_frf_levels")
     compare_levels = import_late("frf_ipz.diagnosis.measured.levels", "compare_levels")
-    observe = import_late("frf_ipz.diagnosis.observations", "observe")
+    observe_from = import_late("frf_ipz.diagnosis.observations", "observe_from")
 
 STAGES = ("diagnose", "levels")
 RUN_SECONDS = 60.0  # wall time of a search in a run, where the user states none
@@ -70,7 +70,7 @@ def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet, *, is_as
     def compute(progress: Progress) -> Diagnosis:
         words = _Words(progress=progress)
         deadline = Deadline(seconds=seconds, at_check=words.repeat)
-        observations = observe(inputs.test, ingest=ingest_options, frfs=frfs, fit=inputs.options.fit)
+        observations = observe_from(runner.recordings, ingest=ingest_options, frfs=frfs, fit=inputs.options.fit)
         return find_causes(
             model,
             observations,
@@ -163,7 +163,7 @@ def levels(runner: StageRunner, fit: ModalFit, frfs: FrfSet) -> LevelDependence:
     def compare(_: Progress) -> LevelDependence:
         if test.kind == "frf":
             return compare_frf_levels(read_frf_levels(test), fit)
-        return compare_levels(observe(test, ingest=options.ingest, frfs=frfs, fit=options.fit), fit)
+        return compare_levels(observe_from(runner.recordings, ingest=options.ingest, frfs=frfs, fit=options.fit), fit)
 
     return runner.stage("levels", {"after": runner.after("ingest", "fit")}, compare)
 

@@ -1,9 +1,17 @@
 """FRFs continued off their lines: errors by the unknown FRF outside the band."""
 
+from types import SimpleNamespace
+
 import numpy as np
+from numpy.testing import assert_allclose
 
 from frf_ipz.diagnosis.measured.contour import COARSE, fine_contour, wide_contour
-from frf_ipz.diagnosis.measured.from_frfs import continue_frfs, continue_frfs_coarsely, survey_frfs
+from frf_ipz.diagnosis.measured.from_frfs import (
+    _noise_covariance,
+    continue_frfs,
+    continue_frfs_coarsely,
+    survey_frfs,
+)
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel, FrfQuantity, FrfSet
 
@@ -86,3 +94,13 @@ def test_a_global_scan_takes_errors_as_independent():
     variance = np.diag(covariance).real
     assert np.abs(covariance - np.diag(variance)).max() < 1e-6 * variance.max()
     assert np.max(np.abs(error_of(structure, measured)) ** 2 / variance) < 16.0
+
+
+def test_errors_of_lines_are_those_of_their_weighted_sums():
+    """The covariance is Hermitian, and that of sums of independent errors."""
+    rng = np.random.default_rng(4)
+    weights = rng.standard_normal((7, 40)) + 1j * rng.standard_normal((7, 40))
+    of_lines = SimpleNamespace(variance=rng.random((40, 2)))
+    covariance = _noise_covariance(of_lines, weights)
+    for found, variance in zip(covariance, of_lines.variance.T, strict=True):
+        assert_allclose(found, weights @ np.diag(variance) @ weights.conj().T, rtol=1e-9, atol=1e-9)

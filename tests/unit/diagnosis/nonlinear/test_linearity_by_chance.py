@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.nonlinear.linearity import LIMIT_HAMMER, WIDTH, _frf_misfit, decaying_correlation, largest_mean
+from frf_ipz.diagnosis.nonlinear.linearity import (
+    LIMIT_HAMMER,
+    WIDTH,
+    _frf_misfit,
+    _quotient_misfit_of,
+    decaying_correlation,
+    largest_mean,
+)
 
 DURATION_S, GATE_S, DECAYS = 1.0, 0.005, 8.0
 LEVELS = np.array([1.0, 0.3, 0.1])
@@ -42,3 +49,16 @@ def drawn(rng, n_records):
     """Complex numbers of variance 1, (n_records, WIDTH)."""
     parts = rng.standard_normal((2, n_records, WIDTH))
     return (parts[0] + 1j * parts[1]) / np.sqrt(2)
+
+
+def test_transients_are_projected_out_as_if_they_were_fitted():
+    """One round of one record after another is least squares by all columns, those of each transient too."""
+    rng = np.random.default_rng(6)
+    force, motion = rng.standard_normal((2, 5, WIDTH)) + 1j * rng.standard_normal((2, 5, WIDTH))
+    noise = np.array([np.zeros((5, WIDTH)), np.full((5, WIDTH), 1e6)])  # so loud that all lines weigh the same
+    above = np.linspace(-1, 1, WIDTH)[:, None] ** np.arange(3)
+    of_frf = (above * force[..., None]).reshape(5 * WIDTH, -1)
+    columns = np.hstack([of_frf, np.kron(np.eye(5), above)])
+    left = motion.ravel() - columns @ np.linalg.lstsq(columns, motion.ravel(), rcond=None)[0]
+    expected = np.sum(np.abs(left) ** 2) / 1e6 / (motion.size - columns.shape[1])
+    assert _quotient_misfit_of((0, 2), force, motion, noise) == pytest.approx(expected, rel=1e-5)

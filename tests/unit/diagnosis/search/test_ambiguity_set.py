@@ -12,6 +12,7 @@ from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.search import ambiguity_set as ties
 from frf_ipz.diagnosis.search.ambiguity_set import add_distant_candidates, find_next_neighbour, rescore_ambiguity_set
 from frf_ipz.diagnosis.search.component_search import Ranking, fit_null_model
+from frf_ipz.diagnosis.search.global_scan import scan_globally
 from frf_ipz.dofs import parse_dof
 from frf_ipz.fe.changes import with_point_masses, with_springs
 
@@ -61,6 +62,14 @@ def test_a_mirrored_location_that_explains_as_well_is_added(symmetric):
     add_distant_candidates(symmetric, ranking, fits)
     log_evidence = evidence(fits.values())
     assert log_evidence[MIRRORED] == pytest.approx(log_evidence[TRUE], abs=0.1)
+
+
+def test_what_a_search_has_scanned_is_not_scanned_again(symmetric, monkeypatch):
+    null = fit_null_model(symmetric)
+    starts = scan_globally(symmetric, null)
+    ranking = replace(only(symmetric, TRUE), base=null, scanned=tuple(starts))
+    monkeypatch.setattr(ties, "scan_globally", lambda *_: pytest.fail("scanned again"))
+    assert add_distant_candidates(symmetric, ranking, by_key(ranking)) == len(starts)
 
 
 @pytest.mark.parametrize(("true", "mirrored"), [(12, 14), (14, 12)])

@@ -357,6 +357,30 @@ def test_more_firsts_are_tried_where_no_pair_explains_all(monkeypatch, is_good, 
     assert tried == fits[1 : 1 + count]
 
 
+@pytest.mark.parametrize(
+    ("companion", "is_far_off", "is_located_anew"),
+    [("a mass", False, True), ("a resonator", False, False), ("a resonator", True, True)],
+)
+def test_pairs_with_the_best_single_one_are_not_located_anew(monkeypatch, companion, is_far_off, is_located_anew):
+    """What explains most beside that was searched already, unless it was far off."""
+
+    def component(name, node):
+        return SimpleNamespace(effect=SimpleNamespace(name=name), location=Location.at_node(node, "z"))
+
+    def fit(*components, far=False):
+        hypothesis = SimpleNamespace(components=components)
+        return SimpleNamespace(hypothesis=hypothesis, log_evidence=0.0, is_nearly_right=True, is_far_off=far)
+
+    best = fit(component("a resonator", 7), far=is_far_off)
+    other = fit(component("a spring", 3))
+    pair = fit(other.hypothesis.components[0], component(companion, 8))
+    located = []
+    monkeypatch.setattr(pairs, "search_small_component", lambda *_: Ranking(base=other, fits=(pair,), n_tried=0))
+    monkeypatch.setattr(pairs, "_reposition", lambda _, ranking: located.append(ranking) or ranking)
+    pairs._search_other_firsts(None, Ranking(base=best, fits=(best, other), n_tried=0), best, 1)
+    assert bool(located) == is_located_anew
+
+
 def test_the_best_location_of_each_effect_is_fitted_before_second_ones():
     """A linear step promises a small part of what some effects explain."""
     promised = [

@@ -11,7 +11,7 @@ not determine, since they are of one level, stays in them; the remaining uncerta
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -73,6 +73,8 @@ class _Group:
     pole_stds: FloatArray  # rad/s
     residues: FloatArray  # (n_poles, n_sensors), at most
     missing_samples: FloatArray  # (n_records, n_sensors), standard deviation of a first sample for the missing ones
+    _spectra: dict[bool, ComplexArray] = field(init=False, default_factory=dict, repr=False)
+    _signals: dict[tuple[bool, int], FloatArray] = field(init=False, default_factory=dict, repr=False)
 
     @property
     def n_samples(self) -> int:
@@ -89,7 +91,13 @@ class _Group:
         return 1 + FIRST_SAMPLES + (2 * len(self.poles) if record.has_predecessor else 0)
 
     def unit_spectra(self, record: ObservedRecord) -> ComplexArray:
-        """Transform terms of amplitude 1, (n_lines / FINER, n_terms)."""
+        """Transform terms of amplitude 1, (n_lines / FINER, n_terms): once for all records that have the same terms."""
+        key = record.has_predecessor
+        if key not in self._spectra:
+            self._spectra[key] = self._transform_units(record)
+        return self._spectra[key]
+
+    def _transform_units(self, record: ObservedRecord) -> ComplexArray:
         step, s, n = record.step_s, self.lines.s[::FINER, None], self.n_samples
 
         def transformed(rates: ComplexArray) -> ComplexArray:
@@ -104,6 +112,12 @@ class _Group:
 
     def unit_signals(self, record: ObservedRecord) -> FloatArray:
         """Terms of amplitude 1 in time, (n_terms, n_samples); 0 for first samples, which FRFs allow for."""
+        key = record.has_predecessor, record.n_samples
+        if key not in self._signals:
+            self._signals[key] = self._evaluate_units(record)
+        return self._signals[key]
+
+    def _evaluate_units(self, record: ObservedRecord) -> FloatArray:
         first = np.vstack([np.ones(record.n_samples), np.zeros((FIRST_SAMPLES, record.n_samples))])
         if not record.has_predecessor:
             return first
