@@ -213,15 +213,16 @@ def level(evidence: Evidence) -> Iterator[Check]:
     doubt = float(np.log(fitted.level))
     if fitted.is_relative:
         return
-    if abs(doubt) <= NO_CHANCE * np.hypot(fitted.level_std, MASS_STD):
+    limit = NO_CHANCE * float(np.hypot(fitted.level_std, MASS_STD))
+    if abs(doubt) <= limit:
         return
     low, high = (np.exp(doubt + side * NORMAL_90 * fitted.level_std) for side in (-1, 1))
     mass = f"{100 * abs(np.expm1(-doubt)):.2g} % {'heavier' if doubt < 0 else 'lighter'}"
     yield Check(
         name="mass of the model",
         verdict=Verdict.WITH_CARE,
-        figure=fitted.level,
-        limit=1.0,
+        figure=abs(doubt),
+        limit=limit,
         unit="1",
         says=f"measured amplitudes of modes are {fitted.level:.3g} times those of the model (90 %: {low:.3g} to "
         f"{high:.3g}): either the structure is {mass} than its model in these modes, or a unit or sensitivity of "
