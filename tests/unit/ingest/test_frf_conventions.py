@@ -63,6 +63,17 @@ def test_one_conjugated_frf_beside_others_is_named(tmp_path):
     assert "2:+z / 7:+z looks conjugated beside the other FRFs" in message(tmp_path, values)
 
 
+def test_one_conjugated_receptance_is_named_where_one_peak_holds_the_power(tmp_path):
+    """The lowest peak of a receptance stands on three lines, and has the power of all others many times over."""
+    structure = Structure(shapes=((1.0, 0.7, -0.5), (-0.6, 0.8, 0.9)), frequency_hz=(9.0, 81.0, 177.0))
+    values = structure.accelerance(2j * np.pi * LINES_HZ[1:]) / (2j * np.pi * LINES_HZ[1:, None]) ** 2
+    right = estimate(tmp_path, values, lines_hz=LINES_HZ[1:], quantity="receptance")
+    assert right.warnings == ()
+    values = np.column_stack([values[:, 0], np.conj(values[:, 1])])
+    text = message(tmp_path, values, lines_hz=LINES_HZ[1:], quantity="receptance")
+    assert "2:+z / 7:+z looks conjugated beside the other FRFs" in text
+
+
 @pytest.mark.parametrize("step", [1, 4, 9])
 def test_conjugated_frfs_are_named_on_coarse_lines_and_not_seen_in_noise(tmp_path, step):
     assert "look conjugated" in message(tmp_path, np.conj(VALUES)[::step], lines_hz=LINES_HZ[::step])
@@ -122,7 +133,11 @@ def test_a_coherence_in_per_cent_or_above_1(tmp_path):
     assert "goes up to 99: taken as per cent" in result.warnings[0]
     result = estimate(tmp_path, coherence=(1.5 * coherence).tolist())
     assert np.isnan(result.frfs.coherence).all()
-    assert "none is above 1: left out" in result.warnings[0]
+    assert "goes up to 1.485, at 300 Hz, and none is above 1: left out" in result.warnings[0]
+    coherence[40] = -0.02
+    text = message(tmp_path, coherence=coherence.tolist())
+    assert "the FRF 1:+z / 7:+z has the coherence -0.02 at 40 Hz, below zero" in text
+    coherence[40] = 0.9
     result = estimate(tmp_path, coherence=np.minimum(coherence * 1.0102, 1.0001).tolist())
     assert result.frfs.coherence.max() == 1.0
     assert result.warnings == ()
@@ -141,7 +156,8 @@ def test_files_of_different_resolution_share_the_coarse_lines(tmp_path):
     result = frf_ipz.estimate_frfs(frf_ipz.read_test(tmp_path / "test.toml"))
     np.testing.assert_array_equal(result.frfs.frequency_hz, LINES_HZ)
     np.testing.assert_array_equal(result.frfs.values[:, 0], fine[::4, 0])
-    assert "301 of up to 1201 lines are used: those that all FRFs share; b.csv has more" in result.warnings
+    used = "301 of up to 1201 lines are used: those that all FRFs share"
+    assert f"{used}; b.csv has more; a.csv has the fewest" in result.warnings
 
 
 @pytest.mark.parametrize(

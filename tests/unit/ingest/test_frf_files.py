@@ -270,7 +270,8 @@ def test_only_common_lines_are_used_and_reported(tmp_path):
     result = read(tmp_path, entry(), entry("b.csv"))
     np.testing.assert_allclose(result.frfs.frequency_hz, LINES_HZ[20:], rtol=DIGITS)
     np.testing.assert_allclose(result.frfs.values[:, 0], VALUES[20:, 0], rtol=DIGITS)
-    assert "381 of up to 401 lines are used" in result.warnings[0]
+    used = "381 of up to 401 lines are used: those that all FRFs share; frf.csv has more"
+    assert result.warnings[0] == f"{used}; none below {LINES_HZ[20]:g} Hz, where b.csv begins"
 
 
 def test_masses_and_scale_are_handed_on(tmp_path):
@@ -310,7 +311,7 @@ def test_values_that_cannot_be(tmp_path):
     long_csv(tmp_path, extra=("variance",))
     file = tmp_path / "frf.csv"
     file.write_text(file.read_text(encoding="utf-8").replace(",0.25\n", ",-0.25\n", 1), encoding="utf-8")
-    assert re.search("column 'variance': the FRF .* has a negative variance", message(tmp_path, entry()))
+    assert re.search("column 'variance': the FRF .* has the variance .* Hz, below zero", message(tmp_path, entry()))
 
 
 @pytest.mark.parametrize(

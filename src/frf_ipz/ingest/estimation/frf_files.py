@@ -271,7 +271,9 @@ def _check_frfs(frfs: Sequence[MeasuredFrf], others: Sequence[MeasuredFrf] = ())
         for name in ("coherence", "variance"):
             values = getattr(frf, name)
             if values is not None and (values < 0.0).any():
-                raise FileFormatError(path, f"the FRF {label} has a negative {name}", where=f"column '{name}'")
+                worst = int(np.nanargmin(values))
+                problem = f"the FRF {label} has the {name} {values[worst]:g} at {frequency[worst]:g} Hz, below zero"
+                raise FileFormatError(path, f"{problem}; correct it, or leave it empty", where=f"column '{name}'")
 
 
 def _common_lines(frfs: Sequence[MeasuredFrf]) -> tuple[FloatArray, tuple[str, ...]]:
@@ -287,10 +289,29 @@ def _common_lines(frfs: Sequence[MeasuredFrf]) -> tuple[FloatArray, tuple[str, .
         raise _no_common_lines(frfs)
     largest = max(len(frf.frequency_hz) for frf in frfs)
     if len(lines) < largest:
-        lost = max(frfs, key=lambda frf: len(frf.frequency_hz))
-        used = f"{len(lines)} of up to {largest} lines are used"
-        notes[f"{used}: those that all FRFs share; {lost.source.path.name} has more"] = None
+        notes[_say_lines_left_out(frfs, len(lines), largest)] = None
     return lines, tuple(notes)
+
+
+def _say_lines_left_out(frfs: Sequence[MeasuredFrf], n_used: int, largest: int) -> str:
+    """Say which files have lines that others lack, and where a file begins or ends before others."""
+    finest = max(frfs, key=lambda frf: len(frf.frequency_hz))
+    last = max(frfs, key=lambda frf: frf.frequency_hz[0])
+    first = min(frfs, key=lambda frf: frf.frequency_hz[-1])
+    bounds = [
+        (last, last.frequency_hz[0], min(frf.frequency_hz[0] for frf in frfs), "below", "begins"),
+        (first, first.frequency_hz[-1], max(frf.frequency_hz[-1] for frf in frfs), "above", "ends"),
+    ]
+    spans = [
+        f"; none {side} {bound:g} Hz, where {frf.source.path.name} {verb}"
+        for frf, bound, widest, side, verb in bounds
+        if abs(bound - widest) > SIX_DIGITS * abs(bound)
+    ]
+    coarsest = min(frfs, key=lambda frf: _count_between(frf.frequency_hz, last.frequency_hz[0], first.frequency_hz[-1]))
+    if not spans:
+        spans = [f"; {coarsest.source.path.name} has the fewest"]
+    used = f"{n_used} of up to {largest} lines are used: those that all FRFs share"
+    return f"{used}; {finest.source.path.name} has more{''.join(spans)}"
 
 
 def _count_between(frequency_hz: FloatArray, low: float, high: float) -> int:

@@ -143,7 +143,8 @@ def _check_coherence(frf: MeasuredFrf) -> MeasuredFrf:
     if PER_CENT < largest <= 100.0 * (1.0 + PRINTED):
         note = f"{name}: the coherence goes up to {largest:g}: taken as per cent"
         return replace(frf, coherence=np.minimum(coherence / 100.0, 1.0), notes=(*frf.notes, note))
-    note = f"{name}: the coherence goes up to {largest:g}, and none is above 1: left out"
+    hertz = frf.frequency_hz[np.nanargmax(coherence)]
+    note = f"{name}: the coherence goes up to {largest:g}, at {hertz:g} Hz, and none is above 1: left out"
     return replace(frf, coherence=None, notes=(*frf.notes, note))
 
 
@@ -197,17 +198,30 @@ def _refuse_conjugated(frfs: Sequence[MeasuredFrf]) -> None:
             problem = "these FRFs look conjugated: their phase rises through resonances, as for exp(-i omega t)"
             problem += "; give their [[frf]] conjugated = true, or export their complex conjugate"
         raise FileFormatError(source.path, problem)
-    against = [
-        str(frf.label) for frf, sense in zip(counted, turnings, strict=True) if sense > SURELY and _resolves(frf)
-    ]
-    if against and (turnings < -SURELY).any():
-        problem = f"{', '.join(against)} looks conjugated beside the other FRFs: its phase rises through resonances"
-        raise FileFormatError(source.path, f"{problem}; export all FRFs by one convention")
+    for weighted in ([frf.values for frf in counted], [_as_acceleration(frf) for frf in counted]):
+        against = _turning_against(weighted)
+        if against.any():
+            names = [str(frf.label) for frf, turns in zip(counted, against, strict=True) if turns]
+            problem = f"{', '.join(names)} looks conjugated beside the other FRFs: its phase rises through resonances"
+            raise FileFormatError(source.path, f"{problem}; export all FRFs by one convention")
 
 
-def _resolves(frf: MeasuredFrf) -> bool:
+def _as_acceleration(frf: MeasuredFrf) -> ComplexArray:
+    """Weigh an FRF by frequency, as an accelerance is: in a receptance the lowest peak holds nearly all power."""
+    power = 2 - frf.source.quantity.power
+    return np.asarray(frf.values * frf.frequency_hz**power)
+
+
+def _turning_against(values: Sequence[ComplexArray]) -> BoolArray:
+    """Find the FRFs that surely turn against causality, where others surely turn by it."""
+    turnings = np.array([_turning(column) for column in values])
+    against = (turnings > SURELY) & [_resolves(column) for column in values]
+    return np.asarray(against & (turnings < -SURELY).any())
+
+
+def _resolves(values: ComplexArray) -> bool:
     """Tell whether an FRF turns over several lines, not from one to the next."""
-    steps = np.abs(np.imag(frf.values[1:] * np.conj(frf.values[:-1])))
+    steps = np.abs(np.imag(values[1:] * np.conj(values[:-1])))
     return float(steps.sum()) ** 2 > RESOLVED * float(np.sum(steps**2))
 
 
