@@ -336,6 +336,8 @@ def test_a_complex_stiffness_damps_each_mode_by_what_it_loses_there():
         lossy += whole[np.ix_(free, free)]
     complex_stiffness = stiffness + 1j * (2e-3 * (stiffness - lossy) + 2e-2 * lossy)
     model = StructuralModel.from_matrices(mass, complex_stiffness, dofs=names(source))
+    share = np.abs(complex_stiffness.imag).sum() / np.abs(stiffness).sum()
+    assert f"imaginary part of the stiffness, {share:.2g} of the real one, is structural damping" in model.notes[-1]
     modes = solve_modes(model, n_modes=4)
     roots = np.sqrt(linalg.eigvals(complex_stiffness, mass))
     roots = roots[np.argsort(roots.real)][:4]
