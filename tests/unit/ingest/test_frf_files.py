@@ -370,7 +370,11 @@ def test_a_channel_in_a_test_of_frfs(tmp_path):
     [
         ({"func_type": 1}, "holds no data set 58 with a frequency response function"),
         ({"rsp_dir": 0}, "states no direction of the response .direction 0 at node 3.; give.*direction = .z."),
-        ({"rsp_node": 0}, "the response is at node 0, and node 0 is the ground; name output_dof and input_dof"),
+        (
+            {"rsp_node": 0},
+            "the response is at node 0, and node 0 is the ground; name output_dof and input_dof in its .*, or where "
+            "it holds several FRFs, count nodes from 1",
+        ),
         ({"ref_node": 0}, "the reference is at node 0, and node 0 is the ground; name output_dof and input_dof"),
         ({"ordinate_spec_data_type": 8}, "is stated to be receptance, but the test says accelerance"),
         ({"orddenom_spec_data_type": 12}, "is not a ratio to a force"),

@@ -173,8 +173,9 @@ def _make_dof(source: FrfSource, function: UniversalFunction, node: int, directi
     key = "output_dof" if end == "response" else "input_dof"
     where = f"data set {function.number}, line {function.line}"
     if node <= 0:
-        problem = f"the {end} is at node {node}, and node 0 is the ground; name output_dof and input_dof in its [[frf]]"
-        raise FileFormatError(source.path, problem, where=where)
+        problem = f"the {end} is at node {node}, and node 0 is the ground"
+        way_out = "name output_dof and input_dof in its [[frf]], or where it holds several FRFs, count nodes from 1"
+        raise FileFormatError(source.path, f"{problem}; {way_out}", where=where)
     if direction == 0 and source.direction:
         sign = -1 if source.direction.startswith("-") else 1
         return Dof(node, source.direction.lstrip("+-"), sign)
