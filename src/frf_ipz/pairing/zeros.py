@@ -75,7 +75,7 @@ def pair_zeros(
     """
     measured = np.flatnonzero(fit.zeros.frf == frf)
     values = fit.zeros.values[measured]
-    gap = map_frequency(np.log(np.abs(values)), *poles)[:, None] - np.log(np.abs(model.values))
+    gap = map_frequency(np.log(np.abs(values)), *poles)[:, None] - np.log(np.abs(model.values) + np.finfo(float).tiny)
     slopes = measured_slope_sign(fit.model, frf, fit.labels[frf].quantity.power, values) * np.sign(polarity)
     wrong = WRONG_SLOPE * (slopes[:, None] * model.slope_sign < 0)
     kinds = np.array([fit.zeros.kind[zero] for zero in measured], dtype=object)

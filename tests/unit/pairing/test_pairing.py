@@ -274,6 +274,13 @@ def test_a_zero_on_a_pole_is_no_obstacle():
     assert model_zeros(model, [label(1, 1)])[0].slope_sign.tolist() == [0.0, 0.0]
 
 
+def test_a_zero_at_0_pairs_with_none():
+    """That of a loose mass beside the structure; without a warning of NumPy."""
+    model = replace(two_loops(1.0, 1.0), stiffness=np.diag([1e5, 0.0]), damping=np.diag([1.0, 0.0]))
+    pairs = pair_roots(measured(model, (label(1, 1),), poles=[1], zeros=False), model)
+    assert [(row.measured, row.computed) for row in pairs.targets] == [(0, 1)]
+
+
 def test_a_rigid_body_is_no_mode_that_could_be_measured():
     model = chain(free=True)
     assert np.abs(model_poles(model, LABELS).values[0]) < 1e-3
