@@ -484,7 +484,7 @@ class _System:
             stiffness, mass = admissible.reduced(stiffness), admissible.reduced(mass)
             dofs = tuple(dofs[row] for row in admissible.independent.tolist())
         motions = rigid_body_motions(dofs, model.geometry)
-        in_print = model.rounding if model.rounding > EPS else 0.0
+        in_print = model.rounding if _is_rounded(stiffness, motions, model.rounding) else 0.0
         whole = cls(
             stiffness=stiffness,
             mass=mass,
@@ -538,6 +538,29 @@ def _by_printed_positions(system: _System) -> FloatArray:
     return PRINTED * rounding_m * multiply(abs(system.stiffness), moves)
 
 
+def _is_rounded(stiffness: Matrix, motions: FloatArray, rounding: float) -> bool:
+    """Tell numbers that were rounded from round ones: in equilibrium the terms of a row cancel, of rounded ones do not.
+
+    Rows that are off by more than the rounding are those of supports.
+    """
+    if rounding <= EPS:
+        return False
+    n_seen = 0
+    for motion in motions.T:
+        forces = _relative_forces(stiffness, motion)
+        forces = forces[forces <= PRINTED * rounding]
+        n_seen += len(forces)
+        if len(forces) and np.quantile(forces, FREE_ROWS) > NO_ENERGY * EPS:
+            return True
+    return n_seen == 0
+
+
+def _relative_forces(stiffness: Matrix, motion: FloatArray) -> FloatArray:
+    """Force on each row that a motion loads, of the sum of its terms' sizes."""
+    sizes = multiply(abs(stiffness), np.abs(motion))
+    return np.asarray(np.abs(multiply(stiffness, motion))[sizes > 0] / sizes[sizes > 0])
+
+
 def _arithmetic_rounding(stiffness: Matrix, motions: FloatArray) -> float:
     """Relative rounding of the stiffness matrix: force on most rows under a rigid motion, which strains nothing.
 
@@ -545,9 +568,8 @@ def _arithmetic_rounding(stiffness: Matrix, motions: FloatArray) -> float:
     """
     roundings = [EPS]
     for motion in motions.T:
-        sizes = multiply(abs(stiffness), np.abs(motion))
-        if sizes.any():
-            forces = np.abs(multiply(stiffness, motion))[sizes > 0] / sizes[sizes > 0]
+        forces = _relative_forces(stiffness, motion)
+        if len(forces):
             roundings.append(float(np.quantile(forces, FREE_ROWS)))
     return max(rounding for rounding in roundings if rounding <= MAX_ROUNDING)
 

@@ -146,3 +146,29 @@ def test_numbers_that_a_person_has_written_are_exact():
     model = frf_ipz.StructuralModel.from_matrices(np.eye(6), stiffness, dofs=[f"{node}:x" for node in range(1, 7)])
     expected = np.sqrt(np.linalg.eigvalsh(stiffness)) / (2 * np.pi)
     assert_allclose(solve_modes(model).natural_frequency_hz, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("spring", [0.0, 1e4])
+def test_round_numbers_are_not_rounded_ones(spring):
+    """A beam of elements of 6 cm has no more than four digits in its stiffness, E I is 403.2: none is cut off."""
+    n_elements, length, rigidity = 12, 0.06, 403.2
+    element = np.array([[12, -6, -12, -6], [-6, 4, 6, 2], [-12, 6, 12, 6], [-6, 2, 6, 4]])
+    powers = length ** -np.array([[3, 2, 3, 2], [2, 1, 2, 1], [3, 2, 3, 2], [2, 1, 2, 1]])
+    stiffness = np.zeros((2 * n_elements + 2,) * 2)
+    for first in range(0, 2 * n_elements, 2):
+        stiffness[first : first + 4, first : first + 4] += rigidity * element * powers
+    held = 0 if spring else 2
+    stiffness = stiffness[held:, held:]
+    for row in (4, 20):
+        stiffness[row, row] += spring
+    mass = np.tile([0.08, 1e-5], n_elements + 1)[held:]
+    nodes = range(1 + held // 2, n_elements + 2)
+    model = frf_ipz.StructuralModel.from_matrices(
+        np.diag(mass),
+        stiffness,
+        dofs=[f"{node}:{name}" for node in nodes for name in ("z", "ry")],
+        coordinates={node: ((node - 1) * length, 0.0, 0.0) for node in nodes},
+    )
+    assert model.rounding > 1e-6  # what their digits look like
+    expected = np.sqrt(eigh(stiffness, np.diag(mass), eigvals_only=True)) / (2 * np.pi)
+    assert_allclose(solve_modes(model, n_modes=4).natural_frequency_hz, expected[:4], rtol=1e-5)
