@@ -28,6 +28,7 @@ from frf_ipz.numerics.block_lanczos import largest_pairs
 from frf_ipz.numerics.factorization import DENSE_ORDER, Factorization, factorize
 from frf_ipz.numerics.rounding import printed_decimals
 from frf_ipz.structure import Geometry, StructuralModel
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import Matrix
@@ -42,6 +43,7 @@ MAX_ROUNDING = 1e-9  # of a stiffness matrix that a condensation has rounded
 PRINTED = 2.0  # roundings of the sum of all terms' sizes: no row of a matrix that is rounded, or cut off, has more
 SHIFT_UP = 10.0  # times, until a stiffness with negative eigenvalues is positive definite with it
 SHIFTS_UP = 40  # of such steps: no negative stiffness is beyond
+BENT = 1e-4  # of the kinetic energy: a cantilever's first mode, nearly a rotation, has 3e-3 beside it; rounding far less
 SPREAD = 4.0  # half units of the last digit of all terms, added in squares: no sum of rounded terms is farther off
 FREE_ROWS = 0.9  # of the rows lie away from supports, so that a translation strains nothing there
 DEPENDENT = 1e-10  # of the largest weight: a combination of motions below is linearly dependent
@@ -168,7 +170,7 @@ def solve_modes(model: StructuralModel, *, n_modes: int | None = None, up_to_hz:
     ConvergenceError
         If the iteration for a large model ends without result.
     IllConditionedError
-        If mass or stiffness is indefinite.
+        If mass or stiffness is indefinite, or few printed digits hide an elastic mode.
 
     Examples
     --------
@@ -526,9 +528,13 @@ class _System:
     def energy_uncertainty(self, shapes: FloatArray) -> FloatArray:
         """Bound twice the strain energy of each shape that rounding of the stiffness can hide or feign."""
         size = np.abs(shapes)
-        sums = np.sum(size * multiply(abs(self.stiffness), size), 0)
         squares = np.sum(size**2 * multiply(self.stiffness**2, size**2), 0)  # printed entries are rounded one by one
-        return np.asarray(np.maximum(NO_ENERGY * self.in_arithmetic * sums, SPREAD * self.in_print * np.sqrt(squares)))
+        return np.maximum(self.arithmetic_uncertainty(shapes), SPREAD * self.in_print * np.sqrt(squares))
+
+    def arithmetic_uncertainty(self, shapes: FloatArray) -> FloatArray:
+        """Bound twice the strain energy of each shape that double precision or a condensation can hide or feign."""
+        size = np.abs(shapes)
+        return np.asarray(NO_ENERGY * self.in_arithmetic * np.sum(size * multiply(abs(self.stiffness), size), 0))
 
 
 def _by_printed_positions(system: _System) -> FloatArray:
@@ -591,6 +597,8 @@ def _orthonormalised(
         raise _indefinite_error(model, float(eigenvalues.min()))
     rigid = np.abs(eigenvalues) <= uncertainty
     rigid[:n_rigid] = True
+    if system.in_print:
+        _refuse_hidden(model, system, shapes[:, rigid & (np.abs(eigenvalues) > system.arithmetic_uncertainty(shapes))])
     eigenvalues = np.where(rigid, 0.0, eigenvalues)
     ascending = np.argsort(eigenvalues, kind="stable")
     shapes = shapes[:, ascending]
@@ -636,6 +644,22 @@ def _beside_rigid(system: _System, shapes: FloatArray) -> FloatArray:
     shapes = shapes @ (axes[:, -count:] / np.sqrt(weights[-count:]))
     _, axes = linalg.eigh(shapes.T @ multiply(system.stiffness, shapes))
     return np.asarray(shapes @ axes)
+
+
+def _refuse_hidden(model: StructuralModel, system: _System, shapes: FloatArray) -> None:
+    """Refuse shapes of no energy beyond the rounding of printed digits that are no motions of a rigid body."""
+    motions = rigid_body_motions(system.dofs, system.geometry)
+    if not shapes.size or not motions.any():
+        return
+    _, rigid = _ritz(system, motions)
+    share = np.sum((rigid.T @ multiply(system.mass, shapes)) ** 2, 0)
+    n_hidden = int(np.count_nonzero(share < 1.0 - BENT))
+    if n_hidden:
+        digits = f"about {1.0 - np.log10(2.0 * model.rounding):.0f} digits"
+        raise IllConditionedError(
+            f"the stiffness of the model '{model.name}' is printed with {digits}, which do not tell {counted(n_hidden, 'elastic mode')} from a motion without stiffness; export it "
+            "with more digits"
+        )
 
 
 def _indefinite_error(model: StructuralModel, eigenvalue: float) -> IllConditionedError:

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import block_diag, eigh
 
 import frf_ipz
+from frf_ipz.errors import IllConditionedError
 from frf_ipz.fe.eigen import solve_basis, solve_modes
 from printed_digits import cut
 
@@ -172,3 +173,17 @@ def test_round_numbers_are_not_rounded_ones(spring):
     assert model.rounding > 1e-6  # what their digits look like
     expected = np.sqrt(eigh(stiffness, np.diag(mass), eigvals_only=True)) / (2 * np.pi)
     assert_allclose(solve_modes(model, n_modes=4).natural_frequency_hz, expected[:4], rtol=1e-5)
+
+
+@pytest.mark.parametrize("digits", [4, 8])
+def test_an_elastic_mode_that_rounding_hides_is_refused(digits):
+    """A clamped beam of twelve elements, E I no round number: four digits leave nothing of its first mode."""
+    stiffness, mass = (matrix[2:, 2:] for matrix in planar_beam(np.linspace(0.0, 0.72, 13), 5.83e-9))
+    dofs = [frf_ipz.Dof(node, name) for node in range(2, 14) for name in ("y", "rz")]
+    structure = stiffness, mass, dofs, {node: (0.06 * (node - 1), 0.0, 0.0) for node in range(2, 14)}
+    model = from_printed(structure, digits)
+    if digits == 4:
+        with pytest.raises(IllConditionedError, match=r"printed with about 4 digits, which do not tell . elastic mode"):
+            solve_modes(model, n_modes=4)
+    else:
+        assert_allclose(solve_modes(model, n_modes=4).natural_frequency_hz, exact_hz(structure)[:4], rtol=1e-4)
