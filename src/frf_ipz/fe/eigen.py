@@ -43,7 +43,9 @@ MAX_ROUNDING = 1e-9  # of a stiffness matrix that a condensation has rounded
 PRINTED = 2.0  # roundings of the sum of all terms' sizes: no row of a matrix that is rounded, or cut off, has more
 SHIFT_UP = 10.0  # times, until a stiffness with negative eigenvalues is positive definite with it
 SHIFTS_UP = 40  # of such steps: no negative stiffness is beyond
-BENT = 1e-4  # of the kinetic energy: a cantilever's first mode, nearly a rotation, has 3e-3 beside it; rounding far less
+BENT = (
+    1e-4  # of the kinetic energy: a cantilever's first mode, nearly a rotation, has 3e-3 beside it; rounding far less
+)
 SPREAD = 4.0  # half units of the last digit of all terms, added in squares: no sum of rounded terms is farther off
 FREE_ROWS = 0.9  # of the rows lie away from supports, so that a translation strains nothing there
 DEPENDENT = 1e-10  # of the largest weight: a combination of motions below is linearly dependent
@@ -529,7 +531,7 @@ class _System:
         """Bound twice the strain energy of each shape that rounding of the stiffness can hide or feign."""
         size = np.abs(shapes)
         squares = np.sum(size**2 * multiply(self.stiffness**2, size**2), 0)  # printed entries are rounded one by one
-        return np.maximum(self.arithmetic_uncertainty(shapes), SPREAD * self.in_print * np.sqrt(squares))
+        return np.asarray(np.maximum(self.arithmetic_uncertainty(shapes), SPREAD * self.in_print * np.sqrt(squares)))
 
     def arithmetic_uncertainty(self, shapes: FloatArray) -> FloatArray:
         """Bound twice the strain energy of each shape that double precision or a condensation can hide or feign."""
@@ -656,9 +658,10 @@ def _refuse_hidden(model: StructuralModel, system: _System, shapes: FloatArray) 
     n_hidden = int(np.count_nonzero(share < 1.0 - BENT))
     if n_hidden:
         digits = f"about {1.0 - np.log10(2.0 * model.rounding):.0f} digits"
+        hidden = counted(n_hidden, "elastic mode")
         raise IllConditionedError(
-            f"the stiffness of the model '{model.name}' is printed with {digits}, which do not tell {counted(n_hidden, 'elastic mode')} from a motion without stiffness; export it "
-            "with more digits"
+            f"the stiffness of the model '{model.name}' is printed with {digits}, which do not tell {hidden} from a "
+            "motion without stiffness; export it with more digits"
         )
 
 

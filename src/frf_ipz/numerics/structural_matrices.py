@@ -334,8 +334,8 @@ class ModelMatrices:
         if STRUCTURAL in blocks:
             share = float(abs(blocks[STRUCTURAL]).sum() / abs(blocks["stiffness"]).sum())
             notes.append(
-                f"the imaginary part of the stiffness, {share:.2g} of the real one, is structural damping, K (1 + i eta); "
-                "it adds to the damping that the model states"
+                f"the imaginary part of the stiffness, {share:.2g} of the real one, is structural damping, "
+                "K (1 + i eta); it adds to the damping that the model states"
             )
         blocks["stiffness"] = _without_feigned_couplings(blocks["stiffness"], exported.dofs)
         multipliers = find_multipliers(blocks["mass"], blocks["stiffness"])
