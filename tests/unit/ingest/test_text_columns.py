@@ -312,6 +312,11 @@ def test_the_line_of_names_can_be_stated(tmp_path):
     assert "header_row = 9, where no text stands before the numbers" in message(path, "header_row = 9")
 
 
+def test_rows_of_numbers_above_the_stated_line_of_names_are_none_of_the_table(tmp_path):
+    path = write(tmp_path, lambda text: "2024,5,17,9\n1.000,0.981,1.013,0.997\n" + text)
+    expect(read(path, "header_row = 3"))
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -50,7 +50,7 @@ class _CsvRecordings:
         return True
 
     def open(self, path: Path, columns: Sequence[str], keys: TableKeys) -> RawRecording:
-        layout = sniff(path)
+        layout = sniff(path, header_row=keys.header_row)
         found = find_columns(layout, keys, columns=columns)
         if found.time is None and keys.sample_rate_hz is None:
             raise no_time(layout, found)
@@ -68,7 +68,7 @@ class _CsvRecordings:
         )
 
     def look(self, path: Path, keys: TableKeys) -> RecordingContents:
-        layout = sniff(path)
+        layout = sniff(path, header_row=keys.header_row)
         found = find_columns(layout, keys)
         columns = []
         for index, (name, unit) in enumerate(zip(found.names, found.units, strict=True)):

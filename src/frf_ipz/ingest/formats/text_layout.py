@@ -92,7 +92,7 @@ class TextLayout:
         return split_line(line, self.delimiter)
 
 
-def sniff(path: Path, *, skip_rows: int = 0) -> TextLayout:
+def sniff(path: Path, *, skip_rows: int = 0, header_row: int | None = None) -> TextLayout:
     """Find out how a table in a text file is laid out.
 
     Parameters
@@ -101,6 +101,8 @@ def sniff(path: Path, *, skip_rows: int = 0) -> TextLayout:
         The file.
     skip_rows : int
         Lines at the start to skip.
+    header_row : int, optional
+        The line that names the columns, from 1, where it is known: lines of numbers above it are none of the table.
 
     Returns
     -------
@@ -123,7 +125,7 @@ def sniff(path: Path, *, skip_rows: int = 0) -> TextLayout:
             kept = [index for index, line in enumerate(lines) if line.strip() and index >= skip_rows]
             delimiter = _find_delimiter([lines[index] for index in kept[:SAMPLE] + kept[SAMPLE:][-SAMPLE:]])
             split = {index: split_line(lines[index], delimiter) for index in kept}
-            first = _first_row(kept, split)
+            first = _first_row(_below_header(kept, split, header_row), split)
             if first is not None:
                 break
         else:
@@ -342,6 +344,13 @@ def _begins_row(field: str) -> bool:
 
 def _is_entry(field: str) -> bool:
     return _begins_row(field) or text_numbers.is_not_finite(field)
+
+
+def _below_header(kept: Sequence[int], split: dict[int, list[str]], header_row: int | None) -> Sequence[int]:
+    """Keep the lines below the one that names the columns; all where that is a line of numbers, or the last one."""
+    if header_row is None or header_row - 1 not in split or _begins_row(split[header_row - 1][0]):
+        return kept
+    return [index for index in kept if index >= header_row] or kept
 
 
 def _first_row(kept: Sequence[int], split: dict[int, list[str]]) -> int | None:
