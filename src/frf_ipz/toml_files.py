@@ -55,13 +55,15 @@ class WrongKeysError(FileFormatError):
         return tuple(FileFormatError(self.path, text, where=where) for where, text in self._problems.items())
 
 
-def numbered(texts: Iterable[str]) -> str:
+def numbered(texts: Iterable[str], most: int = MOST_SHOWN) -> str:
     """List what is wrong in several places, in one line.
 
     Parameters
     ----------
     texts : iterable of str
         One a place.
+    most : int
+        How many of them to show.
 
     Returns
     -------
@@ -74,8 +76,8 @@ def numbered(texts: Iterable[str]) -> str:
     '(1) a: 1; (2) b: 2'
     """
     shown = [f"({number}) {text}" for number, text in enumerate(texts, start=1)]
-    more = len(shown) - MOST_SHOWN
-    return "; ".join([*shown[:MOST_SHOWN], *([f"and {more} more"] if more > 0 else [])])
+    more = len(shown) - most
+    return "; ".join([*shown[:most], *([f"and {more} more"] if more > 0 else [])])
 
 
 def error_of_all(error: FileFormatError, checks: Iterable[Callable[[], object]]) -> InputError:
@@ -101,7 +103,9 @@ def error_of_all(error: FileFormatError, checks: Iterable[Callable[[], object]])
             errors.append(another)
     parts = {str(part): part.path for found in errors for part in found.parts}
     n_files = len(set(parts.values()))
-    return error if n_files == 1 else InputError(f"{len(parts)} mistakes in {n_files} files: {numbered(parts)}")
+    if n_files == 1:
+        return error
+    return InputError(f"{len(parts)} mistakes in {n_files} files: {numbered(parts, MOST_SHOWN * n_files)}")
 
 
 def read_toml(path: Path, options_type: type[Options], *, required: str = "") -> Options:

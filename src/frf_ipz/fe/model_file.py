@@ -13,6 +13,7 @@ from frf_ipz.errors import FileFormatError, did_you_mean
 from frf_ipz.fe import kinds
 from frf_ipz.fe.model_options import ModelSection
 from frf_ipz.fe.model_ports import with_stated_ports
+from frf_ipz.option_types import Name
 from frf_ipz.toml_files import read_toml
 
 if TYPE_CHECKING:
@@ -69,8 +70,26 @@ class Kind(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _KindKey:
+    """The key that determines how the rest of the file is read."""
+
+    __pydantic_config__ = {"extra": "ignore"}  # noqa: RUF012 - pydantic's own attribute
+
+    kind: Name = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Head:
-    """The part of the file that determines how the rest is read."""
+    """The section with the kind, whatever else it holds: wrong keys of all sections are named at once."""
+
+    __pydantic_config__ = {"extra": "ignore"}  # noqa: RUF012 - pydantic's own attribute
+
+    model: _KindKey
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Model:
+    """The section with the kind, checked."""
 
     __pydantic_config__ = {"extra": "ignore"}  # noqa: RUF012 - pydantic's own attribute
 
@@ -165,6 +184,7 @@ def _read_options(path: Path) -> tuple[Kind, Any]:
     head = read_toml(path, _Head, required="model")
     available = model_kinds()
     if head.model.kind not in available:
+        read_toml(path, _Model)
         advice = did_you_mean(head.model.kind, available)
         raise FileFormatError(path, f"'{head.model.kind}' is no kind of model; {advice}", where="key 'model.kind'")
     kind = available[head.model.kind]

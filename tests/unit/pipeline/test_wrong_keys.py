@@ -41,6 +41,20 @@ def test_wrong_keys_of_all_files_are_told_at_once(refusal, wrong):
     assert "\n" not in message
 
 
+def test_wrong_keys_beside_the_kind_of_the_model_are_told_with_those_of_the_rest(refusal, monkeypatch):
+    monkeypatch.setitem(WRONG, "model.toml", WRONG["model.toml"].replace("[model]", "[model]\nnam = 'plate'"))
+    message = str(refusal("model.toml", "test.toml"))
+    assert "key 'model.nam': unknown key 'nam'" in message
+    assert "key 'beam.widht_m': unknown key 'widht_m'" in message
+
+
+def test_as_many_wrong_keys_are_told_of_each_of_several_files_as_of_one(refusal, monkeypatch):
+    monkeypatch.setitem(WRONG, "pipeline.toml", PIPELINE + "".join(f"[wrong_{number}]\n" for number in range(9)))
+    message = str(refusal(*WRONG))
+    assert "12 mistakes in 3 files" in message
+    assert "(12) " in message
+
+
 def test_wrong_keys_are_told_with_a_file_that_is_missing(refusal):
     message = str(refusal("model.toml"))
     assert "2 mistakes in 2 files: (1) " in message
