@@ -1,5 +1,7 @@
 """Delays of impacts: what a record lacks of its force is none, and a deviation knows what the lines share."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from frf_ipz.identification.search.find_modes import find_modes
 from frf_ipz.ingest.campaign import Recording, VibrationTest
 from frf_ipz.ingest.estimate import estimate_frfs
 from synthetic_campaign import Structure, pulse, respond
+from synthetic_frfs import accelerances, random_modes
 
 RATE_HZ, N_SAMPLES = 2048.0, 4096
 MODES = Structure(
@@ -77,3 +80,13 @@ def test_what_a_record_lacks_of_its_force_is_how_much_too_large_frfs_are():
     assert frfs.select_lines(used).missing_force.shape == frfs.values[used].shape
     assert frfs.select_frfs([0]).missing_force.shape == (frfs.n_lines, 1)
     assert impacts(3).missing_force is None
+
+
+def test_one_late_sensor_of_three_is_named():
+    truth = random_modes([71.5, 134.0, 246.0, 389.0], 0.006, n_outputs=3, n_inputs=1, seed=2)
+    frfs = accelerances(truth, np.arange(60, 1001) * 0.5, noise=3e-4, seed=2)
+    late_s = np.array([0.0, 2.5e-3, 0.0])
+    fit = fit_modes(replace(frfs, values=frfs.values * np.exp(-frfs.s[:, None] * late_s)))
+    np.testing.assert_allclose(fit.model.delay_s, late_s, rtol=0, atol=1e-6)
+    assert any("each by its own delay" in text for text in fit.warnings)
+    np.testing.assert_allclose(fit.modes["frequency_hz"], truth.frequency_hz, rtol=1e-5, atol=0)

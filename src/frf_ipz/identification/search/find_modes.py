@@ -176,7 +176,7 @@ def find_modes(
         return late
     if late is not None and np.median(late.misfit_ratio) < LATE_MISFIT * np.median(fitted.misfit_ratio):
         fitted = late
-    if options.delay is None and np.median(fitted.misfit_ratio) > MODEL_ERROR:
+    if options.delay is None and LATE_MISFIT * _rms(fitted.misfit_ratio) > 1:  # at least the noise is left
         return _fit_delayed_channels(frfs, fitted, options) or fitted
     return fitted
 
@@ -236,6 +236,11 @@ def _fit_from(frfs: FrfSet, first_s: float, options: FitOptions) -> FittedModes 
         return None
 
 
+def _rms(ratios: FloatArray) -> float:
+    """Take FRFs together: where one sensor of several is late, the median FRF tells nothing of it."""
+    return float(np.sqrt(np.mean(ratios**2)))
+
+
 def _fit_delayed_channels(frfs: FrfSet, fitted: FittedModes, options: FitOptions) -> FittedModes | None:
     """Fit each channel's own delay, where that takes off most of the misfit; else None."""
     lines = replace(fitted.lines, variance=fitted.noise)
@@ -243,7 +248,7 @@ def _fit_delayed_channels(frfs: FrfSet, fitted: FittedModes, options: FitOptions
         return None
     own = replace(options, delay=True)
     delayed = _find_modes(frfs, measured_lines(frfs, own), own, silent)
-    if np.median(delayed.misfit_ratio) > LATE_MISFIT * np.median(fitted.misfit_ratio):
+    if _rms(delayed.misfit_ratio) > LATE_MISFIT * _rms(fitted.misfit_ratio):
         return None
     return replace(delayed, has_delayed_channels=True)
 
