@@ -318,7 +318,7 @@ def read_test_keys(path: Path) -> CampaignFileKeys:
     FileFormatError
         If keys are wrong or missing.
     """
-    return read_toml(path.resolve(), CampaignFileKeys, required="test")
+    return read_toml(require_file(path).resolve(), CampaignFileKeys, required="test")
 
 
 def read_test(path: str | Path) -> VibrationTest:

@@ -141,13 +141,13 @@ def test_a_recording_that_is_saved_between_being_digested_and_read_is_refused(ca
     (campaign / "pipeline.toml").write_text(
         (campaign / "pipeline.toml").read_text(encoding="utf-8") + '[ingest]\nestimator = "H2"\n', "utf-8"
     )
-    estimate = measurement.estimate_frfs
+    estimate = measurement.estimate_from
 
     def save_and_estimate(*arguments, **options):
         save_again(recording)
         return estimate(*arguments, **options)
 
-    monkeypatch.setattr(measurement, "estimate_frfs", save_and_estimate)
+    monkeypatch.setattr(measurement, "estimate_from", save_and_estimate)
     with pytest.raises(InputError, match=rf"{recording.name}: has been changed while this command was at work"):
         frf_ipz.run_pipeline(campaign / "pipeline.toml", campaign / "out", until="ingest")
     assert (campaign / "out" / "run.json").read_bytes() == before
