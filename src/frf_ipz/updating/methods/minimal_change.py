@@ -45,7 +45,8 @@ SMALLEST_NOISE = 1e-6  # relative standard deviation of a frequency: none is mea
 OF_DAMPING = 1.0  # change of the logarithm of a modulus by damping, from which damping makes a root
 UNKNOWN_STD = 1e15  # relative, of what is no target: however far its root runs, and with it what moves it
 STEPS_BACK = 16  # to the nominal model: so many that roots keep the greater part of their vectors over each
-MASS_DRAWS, SURELY = 200, 0.95  # of masses of sensors; share of them below nothing from which a mass is none
+MASS_DRAWS = 200  # of masses of sensors
+CHANCE = 0.05  # that of sensors without a mass any one is held to weigh less than nothing, and left out
 SHIFTED = 0.1  # standard deviations of a modulus from which the stiffness is updated again for the change by damping
 
 
@@ -119,16 +120,18 @@ def _solve_with_masses(
     A prior that is symmetric about 0 allows them, and where a change of the stiffness is less likely than many of them
     together, they take its place: poles and zeros are met, and the FRFs at other points are not.
     """
-    update_of = _solve(problem, frame, options, progress)
-    while problem.basis is not None and problem.basis.attached:
-        attached = np.array(problem.basis.attached)
-        drawn = draw_parameters(update_of.posterior, np.random.default_rng(options.seed), MASS_DRAWS)
-        below = attached[np.mean(drawn[:, attached] < 0.0, axis=0) > SURELY]
-        if not len(below):
-            break
-        problem = replace(problem, basis=problem.basis.without_attached(below.tolist()))
+    while True:
         update_of = _solve(problem, frame, options, progress)
-    return update_of
+        basis = problem.basis
+        if basis is None or not basis.attached:
+            return update_of
+        attached = np.array(basis.attached)
+        drawn = draw_parameters(update_of.posterior, np.random.default_rng(options.seed), MASS_DRAWS)
+        below = attached[np.mean(drawn[:, attached] < 0.0, axis=0) > 1.0 - CHANCE / len(attached)]
+        if not len(below):
+            return update_of
+        problem = replace(problem, basis=basis.without_attached(below.tolist()))
+        del update_of  # before another one takes as much memory
 
 
 def _solve(
