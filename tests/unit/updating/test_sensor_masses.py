@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import frf_ipz
+from frf_ipz.updating.methods.minimal_change import surely_below
 from frf_ipz.updating.parameters import make_structural_basis
 
 SENSORS = [frf_ipz.Dof(11, "z"), frf_ipz.Dof(6, "z")]
@@ -48,6 +49,15 @@ def test_a_sensor_weighs_what_is_found():
 
 def test_no_sensor_weighs_less_than_nothing():
     assert mass_at_the_tip(modelled_kg=0.006, real_kg=0.0) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("n_sensors", [2, 100])
+def test_hardly_one_of_many_masses_of_nothing_is_left_out_by_chance(n_sensors):
+    rng = np.random.default_rng(3)
+    means = rng.standard_normal((300, 1, n_sensors))
+    left_out = [surely_below(mean + rng.standard_normal((200, n_sensors))).any() for mean in means]
+    assert 0.02 < np.mean(left_out) < 0.12
+    assert surely_below(rng.standard_normal((200, n_sensors)) - 5.0).all()
 
 
 def test_a_mass_that_is_left_out_takes_its_prior_along():

@@ -14,8 +14,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import ndtri
 
-from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.low_rank import factorise
 from frf_ipz.updating.along_structure import part_table
@@ -127,11 +128,27 @@ def _solve_with_masses(
             return update_of
         attached = np.array(basis.attached)
         drawn = draw_parameters(update_of.posterior, np.random.default_rng(options.seed), MASS_DRAWS)
-        below = attached[np.mean(drawn[:, attached] < 0.0, axis=0) > 1.0 - CHANCE / len(attached)]
+        below = attached[surely_below(drawn[:, attached])]
         if not len(below):
             return update_of
         problem = replace(problem, basis=basis.without_attached(below.tolist()))
         del update_of  # before another one takes as much memory
+
+
+def surely_below(drawn: FloatArray) -> BoolArray:
+    """Find masses that are less than nothing: so far that of as many masses of nothing hardly one is by chance.
+
+    Parameters
+    ----------
+    drawn : (count, n) array
+        Of each mass, kg.
+
+    Returns
+    -------
+    (n,) bool array
+        True where it is.
+    """
+    return np.asarray(np.mean(drawn, axis=0) < ndtri(CHANCE / drawn.shape[1]) * np.std(drawn, axis=0))
 
 
 def _solve(
