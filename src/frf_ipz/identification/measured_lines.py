@@ -12,6 +12,8 @@ from frf_ipz.errors import InputError
 from frf_ipz.identification.noise import BLOCK_LINES, law_of_squares, misfit_variance, rough_variance
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from frf_ipz.frf import ForceNoise, FrfSet
     from frf_ipz.identification.options import FitOptions
     from frf_ipz.numerics.line_sums import LineSums
@@ -267,11 +269,8 @@ def with_misfit_noise(lines: MeasuredLines, misfit: ComplexArray) -> MeasuredLin
     if lines.known.all():
         return lines
     variance = lines.variance.copy()
-    size = np.abs(lines.receptance)
-    # noise is even over the lines in the quantity that was measured: as a receptance it falls by 12 dB an octave
-    to_measured = np.abs(lines.s[:, None]) ** lines.powers
-    noise = misfit_variance(misfit * to_measured, size * to_measured) / to_measured**2
-    variance[:, ~lines.known] = (noise + (MODEL_ERROR * size) ** 2)[:, ~lines.known]
+    noise = _in_measured_quantity(lines, misfit, misfit_variance) + (MODEL_ERROR * np.abs(lines.receptance)) ** 2
+    variance[:, ~lines.known] = noise[:, ~lines.known]
     return replace(lines, variance=variance)
 
 
@@ -290,10 +289,19 @@ def misfit_square(lines: MeasuredLines, misfit: ComplexArray) -> FloatArray:
     (n_lines, n_frfs) array
         As receptances, (m/N)^2: noise, and what the model does not follow.
     """
+    square = _in_measured_quantity(lines, misfit, lambda values, size: law_of_squares(np.abs(values) ** 2, size))
+    return np.asarray(square + (LEAST_NOISE * np.abs(lines.receptance)) ** 2)
+
+
+def _in_measured_quantity(
+    lines: MeasuredLines, misfit: ComplexArray, law: Callable[[ComplexArray, FloatArray], FloatArray]
+) -> FloatArray:
+    """Find squares that are even over the lines in the quantity that was measured; as receptances.
+
+    As a receptance, such noise falls by 12 dB an octave.
+    """
     to_measured = np.abs(lines.s[:, None]) ** lines.powers
-    size = np.abs(lines.receptance)
-    square = law_of_squares(np.abs(misfit * to_measured) ** 2, size * to_measured) / to_measured**2
-    return np.asarray(square + (LEAST_NOISE * size) ** 2)
+    return law(misfit * to_measured, np.abs(lines.receptance) * to_measured) / to_measured**2
 
 
 def _usable(frfs: FrfSet, known: BoolArray) -> BoolArray:
