@@ -108,6 +108,31 @@ def error_of_all(error: FileFormatError, checks: Iterable[Callable[[], object]])
     return InputError(f"{len(parts)} mistakes in {n_files} files: {numbered(parts, MOST_SHOWN * n_files)}")
 
 
+def named_files(path: Path, section: str, keys: Iterable[str]) -> dict[str, Path]:
+    """Find the files that keys of a section name, as far as the file can be read.
+
+    Parameters
+    ----------
+    path : Path
+        A TOML file.
+    section : str
+        One of its sections.
+    keys : iterable of str
+        Keys that may name a file.
+
+    Returns
+    -------
+    dict of str to Path
+        By their key; those that are no text, or not there, are left out.
+    """
+    try:
+        table = parse_toml(read_text(path), path).get(section)
+    except InputError:
+        return {}
+    named = table if isinstance(table, dict) else {}
+    return {key: path.resolve().parent / named[key] for key in keys if isinstance(named.get(key), str)}
+
+
 def read_toml(path: Path, options_type: type[Options], *, required: str = "") -> Options:
     """Read a TOML file into an options dataclass.
 

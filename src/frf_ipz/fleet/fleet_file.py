@@ -20,7 +20,7 @@ from frf_ipz.option_types import Day
 from frf_ipz.output_files import write_text
 from frf_ipz.pipeline.config import PipelineFile, StageOptions
 from frf_ipz.pipeline.pipeline_folder import find_pipeline
-from frf_ipz.toml_files import STRICT, error_of_all, parse_toml, read_toml, to_options
+from frf_ipz.toml_files import STRICT, error_of_all, named_files, parse_toml, read_toml, to_options
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -251,15 +251,9 @@ def read_fleet(path: Path) -> Fleet:
 def _wrong_keys_of_all(error: FileFormatError, path: Path) -> InputError:
     """Say what is wrong with the keys of the fleet, of its pipeline and of its model at once."""
     checks: list[Callable[[], object]] = [partial(read_toml, path, FleetFile, required="fleet")]
-    try:
-        section = parse_toml(read_text(path), path).get("fleet")
-    except FileFormatError:
-        section = None
-    named = section if isinstance(section, dict) else {}
-    for key, read in (("pipeline", _read_settings), ("model", model_files)):
-        file = path.resolve().parent / named[key] if isinstance(named.get(key), str) else None
-        if file is not None and file.is_file():
-            checks.append(partial(read, file))
+    readers = {"pipeline": _read_settings, "model": model_files}
+    files = named_files(path, "fleet", readers)
+    checks += [partial(readers[key], file) for key, file in files.items() if file.is_file()]
     return error_of_all(error, checks)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -15,10 +16,9 @@ from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.ingest.campaign_file import read_test_keys
 from frf_ipz.ingest.options import IngestOptions
-from frf_ipz.input_files import read_text
 from frf_ipz.pipeline.pipeline_folder import find_pipeline
 from frf_ipz.prediction.options import PredictOptions
-from frf_ipz.toml_files import STRICT, error_of_all, parse_toml, read_toml
+from frf_ipz.toml_files import STRICT, error_of_all, named_files, read_toml
 from frf_ipz.updating.options import UpdateOptions
 
 if TYPE_CHECKING:
@@ -130,15 +130,10 @@ def wrong_keys_of_all(error: FileFormatError, path: Path) -> InputError:
         The error itself, unless there is one of another file too.
     """
     checks: list[Callable[[], object]] = [partial(read_pipeline, path)]
-    try:
-        path = find_pipeline(path)
-        section = parse_toml(read_text(path), path).get("pipeline")
-    except InputError:
-        section = None
-    named = section if isinstance(section, dict) else {}
-    for key, read in (("test", read_test_keys), ("model", model_files)):
-        if isinstance(named.get(key), str):
-            checks.append(partial(read, path.resolve().parent / named[key]))
+    readers = {"test": read_test_keys, "model": model_files}
+    with suppress(InputError):
+        files = named_files(find_pipeline(path), "pipeline", readers)
+        checks += [partial(readers[key], file) for key, file in files.items()]
     return error_of_all(error, checks)
 
 
