@@ -252,7 +252,15 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
         noise_from=fitted.noise_from,
         warnings=(*_warnings(frfs, fitted, halves, unconfirmed), *gains.remarks),
         unknown_scale=frfs.unknown_scale,
+        missed=_beyond_noise(misfit, np.sqrt(fitted.noise) * unit),
     )
+
+
+def _beyond_noise(misfit: ComplexArray, noise_std: FloatArray) -> FloatArray:
+    """Moduli of a misfit where they are beyond the largest that the noise of all lines has, on average; else 0."""
+    size = np.abs(misfit)
+    # squared moduli of complex noise are exponential: of n the largest is log n times the mean, on average
+    return np.where(size**2 > noise_std**2 * np.log(misfit.size), size, 0.0)
 
 
 def _error_of_force(fitted: FittedModes) -> FloatArray:

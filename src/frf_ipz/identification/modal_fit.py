@@ -75,6 +75,9 @@ class ModalFit(Tabulated, Drawn):
         ``none``, ``common`` or ``per_channel``, as the FRFs say: gains that are fitted once there is a model.
     stability : Stability
         Tolerances of the stabilisation diagram.
+    missed : (n_used, n_frfs) array, optional
+        How far measured values lie from the fitted FRF, in units of the FRF, where that is more than the noise gives at
+        any of the lines; else 0. Such lines hold a mode that was not identified, or what no linear model has.
     modes_given : ModalParameters, optional
         Modes that were identified elsewhere: the fit of a test without FRFs has them in the place of residues.
 
@@ -123,6 +126,7 @@ class ModalFit(Tabulated, Drawn):
     unknown_scale: str = "none"
     modes_given: ModalParameters | None = None
     stability: Stability = field(default_factory=Stability)
+    missed: FloatArray | None = None
 
     @property
     def connections(self) -> tuple[FrfLabel, ...]:

@@ -1,11 +1,12 @@
 """What an updated model cannot express, estimated where it was measured and carried to where it was not.
 
 At every line, what the updated model misses of the measured FRFs, beyond the spread of its ensemble and the noise of
-the fit, is divided by the size of the FRF: the sum of the moduli of its modes' contributions, which does not vanish at
-zeros. The mean square over the measured FRFs is the relative size of the error there; that of an FRF which was not
-measured is as large in relation to its own size. The mean square of n independent complex numbers is uncertain by
-itself, so that the error has a Student distribution with 2 n degrees of freedom; n is the number of sensors or of
-excited DOFs, whichever are fewer, for what is wrong at one of them is so in all its FRFs.
+the fit, and what the fit itself misses of them beyond their noise, is divided by the size of the FRF: the sum of the
+moduli of its modes' contributions, which does not vanish at zeros. The mean square over the measured FRFs is the
+relative size of the error there; that of an FRF which was not measured is as large in relation to its own size. The
+mean square of n independent complex numbers is uncertain by itself, so that the error has a Student distribution with
+2 n degrees of freedom; n is the number of sensors or of excited DOFs, whichever are fewer, for what is wrong at one of
+them is so in all its FRFs.
 
 [Kennedy2001]: M. C. Kennedy, A. O'Hagan, Bayesian calibration of computer models, Journal of the Royal Statistical
 Society B 63 (2001) 425-464 (doi:10.1111/1467-9868.00294), for a discrepancy beside the parameters.
@@ -105,9 +106,17 @@ def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEn
         noise = (np.stack(std, axis=1) / gains[frfs]) ** 2
         missed = measured[lines, frfs] - values[lines.start, frfs.start] * factor
         excess = np.maximum(np.abs(missed) ** 2 - spread - noise, 0.0)
+        excess += _not_fitted(fit, lines_hz[lines], frfs) / gains[frfs] ** 2
         size = sizes[lines, frfs] ** 2
         power[lines] += np.divide(excess, size, out=np.zeros_like(size), where=size > 0.0).sum(axis=1)
     return ModelError(ratio=np.sqrt(power / len(fit.labels)), degrees=2 * _independent(fit.labels))
+
+
+def _not_fitted(fit: ModalFit, lines_hz: FloatArray, frfs: slice) -> FloatArray:
+    """Power of what the fit misses of the measured FRFs, (lines, frfs)."""
+    if fit.missed is None:
+        return np.zeros((1, 1))
+    return np.stack([np.interp(lines_hz, fit.frequency_hz, of_frf) for of_frf in fit.missed[:, frfs].T], axis=1) ** 2
 
 
 def as_ensemble(updated: UpdatedModel, lowest_rad_s: float) -> ModelEnsemble:

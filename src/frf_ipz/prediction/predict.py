@@ -24,6 +24,7 @@ from frf_ipz.prediction.advice import explain_wide_bands, wide_bands
 from frf_ipz.prediction.ensemble import ModelEnsemble
 from frf_ipz.prediction.model_error import as_ensemble, estimate_model_error, frf_rows, frf_sizes
 from frf_ipz.prediction.prediction import Prediction
+from frf_ipz.prediction.suspension import Suspension, find_suspension, on_suspension
 from frf_ipz.prediction.zeros import predicted_zeros
 from frf_ipz.updating.updated_model import UpdatedModel
 
@@ -89,7 +90,8 @@ def predict_frfs(
     """
     require_measured(measured)
     require_type("updated_model", updated_model, UpdatedModel)
-    labels, updated = measured.connections, updated_model
+    labels = measured.connections
+    suspension, updated = _as_tested(measured, updated_model)
     frequency_hz = take_array(
         "the frequencies", measured.frequency_hz if frequency_hz is None else frequency_hz, np.float64
     )
@@ -107,7 +109,8 @@ def predict_frfs(
     statement = updated.scale.statement if predicted else ""
     bands = wide_bands(frequency_hz, low, high)
     notes = explain_wide_bands(bands, updated.model, ensemble, labels, predicted, frequency_hz, zeros)
-    warnings = (statement,) * bool(statement) + notes
+    hung = "" if suspension is None else suspension.statement
+    warnings = (*filter(None, (statement, hung)), *notes)
     return Prediction(
         frequency_hz=frequency_hz,
         labels=predicted,
@@ -180,7 +183,21 @@ def band_of_magnitudes(
     s = take_array("the lines", s, np.complex128)
     if not s.any():
         raise InputError("all lines are 0; at least one above 0 is needed")
-    return _magnitude_bands(measured, updated_model, _ensemble(updated_model, s), labels, s)
+    _, updated = _as_tested(measured, updated_model)
+    return _magnitude_bands(measured, updated, _ensemble(updated, s), labels, s)
+
+
+_tested: WeakKeyDictionary[UpdatedModel, tuple[Measured, Suspension | None, UpdatedModel]] = WeakKeyDictionary()
+
+
+def _as_tested(measured: Measured, updated: UpdatedModel) -> tuple[Suspension | None, UpdatedModel]:
+    """Give the updated model on the suspension that was measured, and what is known of it."""
+    known = _tested.get(updated)
+    if known is None or known[0] is not measured:
+        suspension = find_suspension(measured, updated)
+        hung = updated if suspension is None else on_suspension(updated, suspension)
+        known = _tested[updated] = measured, suspension, hung
+    return known[1:]
 
 
 _ensembles: WeakKeyDictionary[UpdatedModel, ModelEnsemble] = WeakKeyDictionary()  # roots of all members cost the most

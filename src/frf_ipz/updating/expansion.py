@@ -62,7 +62,7 @@ class ShapeExpansion:
     error_db : (n_points,) array
         How far off its FRFs are then: median over lines, dB; where the scale is unknown, after one factor a point.
     updated_error_db : (n_points,) array
-        The same of the updated model, which was given all points.
+        The same of an update at points that it was not given: every other one, then the others.
     stiffness_ratio : float
         Factor on the stiffness of the model over which they were expanded.
     masses : tuple of AttachedMass
@@ -149,10 +149,10 @@ class ShapeExpansion:
         """What was done and found, for people."""
         worst = int(np.argmax(self.error_db))
         texts = [
-            f"the update of the matrices is {np.median(self.updated_error_db):.2g} dB off at the measured points "
-            "(median), so the measured shapes were expanded over the model in its place: with each point left out in "
-            f"turn, its FRFs follow from the others to {self.median_db:.2g} dB (median; worst {self.points[worst]} "
-            f"with {self.error_db[worst]:.2g} dB)"
+            "the update of the matrices, given half of the measured points, is "
+            f"{np.median(self.updated_error_db):.2g} dB off at the others (median), so the measured shapes were "
+            "expanded over the model in its place: with each point left out in turn, its FRFs follow from the others "
+            f"to {self.median_db:.2g} dB (median; worst {self.points[worst]} with {self.error_db[worst]:.2g} dB)"
         ]
         told = [mass.text for mass in self.masses if mass.low_kg > TOLD * mass.mass_kg]
         if told:

@@ -39,8 +39,8 @@ class UpdateOptions:
     delta_damping : float
         Stop of ``ipz`` when it changes the damping.
     expand : bool
-        Where the update stays more than 1 dB off at the measured points, expand the measured shapes over the model in
-        its place, if each point then follows better from the others (minimal-change).
+        Where the update is more than 1 dB off at measured points that it is not given, expand the measured shapes over
+        the model in its place, if each point then follows better from the others (minimal-change).
     pair_again : bool
         Pair with the model after a first update too, where that gives measured modes other counterparts or sure ones,
         and update further if that brings the model nearer to the measured FRFs (minimal-change).

@@ -33,6 +33,10 @@ from frf_ipz.updating.shape_expansion.expand import with_expanded_shapes
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus, with_free_rigid_bodies
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from frf_ipz.dofs import AnyDof
+    from frf_ipz.frf import FrfLabel
     from frf_ipz.progress import Progress
     from frf_ipz.updating.position_uncertainty import PositionUncertainty
 
@@ -157,11 +161,22 @@ def update_model(
         return kept
     geometry = None if fe_model is None else fe_model.geometry
     final = problem if kept.pairs is None else targets_of(kept.pairs, reduced_model)  # after pairing again
-    expanded = with_expanded_shapes(kept, fit, final, geometry=geometry, options=chosen)
+
+    def update_without(points: Collection[AnyDof]) -> UpdatedModel:
+        rows = tuple(row for row in paired.rows if row.frf < 0 or not _meets(fit.labels[row.frf], points))
+        fewer = replace(paired, rows=rows)
+        alone = cast("Method", module).update(targets_of(fewer, reduced_model), replace(chosen, ensemble=0), silent)
+        return _with_scales(with_free_rigid_bodies(alone), fit, fewer)
+
+    expanded = with_expanded_shapes(kept, fit, final, update_without=update_without, geometry=geometry, options=chosen)
     if expanded.expansion is None:
         return kept
     # what is said of a way back to the nominal model does not hold for measured shapes
     return replace(expanded, status=scaled.status, warnings=(*scaled.warnings, *expanded.expansion.statements))
+
+
+def _meets(label: FrfLabel, points: Collection[AnyDof]) -> bool:
+    return label.output_dof in points or label.input_dof in points
 
 
 def _with_scales(updated: UpdatedModel, fit: ModalFit, paired: Pairs) -> UpdatedModel:

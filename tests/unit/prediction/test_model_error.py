@@ -34,7 +34,8 @@ def predict(machine, *, seed=0):
     fit = frf_ipz.fit_modes(frfs)
     model = frf_ipz.make_beam(**BEAM)
     reduced = frf_ipz.reduce_model(fit, model, points=[POINT])
-    updated = frf_ipz.update_model(fit, reduced, fe_model=model)
+    matrices = frf_ipz.UpdateOptions(expand=False)  # measured shapes meet measured points by construction
+    updated = frf_ipz.update_model(fit, reduced, fe_model=model, options=matrices)
     prediction = frf_ipz.predict_frfs(fit, updated, points=[POINT])
     sure_of_mass = replace(updated, scale=MeasuredScale())
     by_ensemble = frf_ipz.predict_frfs(frfs, sure_of_mass, points=[POINT], frequency_hz=prediction.frequency_hz)
@@ -74,3 +75,31 @@ def test_a_model_that_lacks_a_mass_has_a_band_that_holds_the_truth(lacking, soun
     assert share_inside(prediction, truth) > 0.9 > share_inside(by_ensemble, truth)
     assert half_width_db(prediction) > 1.2 * half_width_db(by_ensemble)
     assert half_width_db(prediction) > 3 * half_width_db(sound[0])
+
+
+def test_a_band_is_wide_where_the_fit_misses_what_was_measured():
+    """A mode between two lines that was not identified: the fit passes below it, and so does the prediction."""
+    lines = np.arange(5.0, 200.0, 0.5)
+    machine, model = frf_ipz.make_beam(**{**BEAM, "youngs_modulus_Pa": 71e9}), frf_ipz.make_beam(**BEAM)
+    values = frf_ipz.compute_frfs(machine, labels(OUTPUTS), 2j * np.pi * lines)
+    std = NOISE * np.sqrt(np.mean(np.abs(values) ** 2, axis=0))
+    frfs = frf_ipz.FrfSet.from_arrays(
+        lines,
+        values[:, :, None],
+        outputs=OUTPUTS,
+        inputs=INPUTS,
+        variance=np.broadcast_to(std**2, values.shape)[:, :, None],
+    )
+    fit = frf_ipz.fit_modes(frfs)
+    assert not fit.missed.any()
+    peak = 300
+    seen = np.zeros_like(fit.missed)
+    seen[peak] = 5 * np.abs(values[peak])
+    updated = frf_ipz.update_model(fit, frf_ipz.reduce_model(fit, model, points=[POINT]), fe_model=model)
+    as_fitted, as_seen = (
+        frf_ipz.predict_frfs(each, updated, points=[POINT]) for each in (fit, replace(fit, missed=seen))
+    )
+    assert half_width_db(as_fitted) < 0.5
+    widths = [10 * np.log10(each.magnitude_high / each.magnitude_low)[:, 0] for each in (as_fitted, as_seen)]
+    assert widths[1][peak] > 5.0
+    assert np.allclose(np.delete(widths[0], [peak]), np.delete(widths[1], [peak]), rtol=1e-9, atol=0)

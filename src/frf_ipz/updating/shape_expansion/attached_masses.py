@@ -60,12 +60,15 @@ class LoadedModel:
         What was found.
     error : float
         Relative error of the measured amplitudes.
+    scatter : float
+        Of the logarithms of measured frequencies about those of the model.
     """
 
     model: ReducedModel
     stiffness_ratio: float
     masses: tuple[AttachedMass, ...]
     error: float
+    scatter: float
 
 
 def attachment_places(model: ReducedModel, measured: MeasuredShapes, geometry: Geometry | None) -> tuple[AnyDof, ...]:
@@ -130,10 +133,10 @@ def find_attached_masses(model: ReducedModel, measured: MeasuredShapes, places: 
         return model.mass + added, np.exp(unknowns[..., 0, None, None]) * model.stiffness
 
     def cost(unknowns: FloatArray) -> FloatArray:
-        modal = ModalModel.of_matrices(*loaded(unknowns), *ends)
         error, scatter = np.exp(unknowns[..., 1 + count]), np.exp(unknowns[..., 2 + count])
+        modal = ModalModel.of_matrices(*loaded(unknowns), *ends, scatter)
         prior = 0.5 * np.sum(((unknowns - typical) / deviations) ** 2, axis=-1)
-        return np.asarray(prior - _log_evidence(modal, measured, error, scatter))
+        return np.asarray(prior - _log_evidence(modal, measured, error))
 
     def with_slope(unknowns: FloatArray) -> tuple[float, FloatArray]:
         steps = DIFFERENCE * np.eye(len(unknowns))
@@ -168,10 +171,11 @@ def find_attached_masses(model: ReducedModel, measured: MeasuredShapes, places: 
         stiffness_ratio=float(np.exp(best[0])),
         masses=tuple(masses),
         error=float(np.exp(best[-2])),
+        scatter=float(np.exp(best[-1])),
     )
 
 
-def _log_evidence(model: ModalModel, measured: MeasuredShapes, error: FloatArray, scatter: FloatArray) -> FloatArray:
+def _log_evidence(model: ModalModel, measured: MeasuredShapes, error: FloatArray) -> FloatArray:
     """Logarithm of the probability of all directions and frequencies, (...)."""
     elastic = model.omega > RIGID * measured.omega.min()
     omega_of_model = np.where(elastic, model.omega, np.inf)
@@ -179,8 +183,8 @@ def _log_evidence(model: ModalModel, measured: MeasuredShapes, error: FloatArray
     for mode, omega in enumerate(measured.omega):
         shape = expand_shape(model, measured, mode, error)
         shares = shape.amplitudes**2 / np.sum(shape.amplitudes**2, axis=-1, keepdims=True)
-        distance = np.log(omega_of_model / omega) / scatter[..., None]
-        density = np.sum(shares * np.exp(-0.5 * distance**2), axis=-1) / scatter
+        distance = np.log(omega_of_model / omega) / model.scatter[..., None]
+        density = np.sum(shares * np.exp(-0.5 * distance**2), axis=-1) / model.scatter
         total += shape.log_evidence + np.log(density + STRANGE)
     return total
 

@@ -1,8 +1,9 @@
 """The step that puts measured shapes, expanded over the model, in the place of an update that does not meet them.
 
 What is missing in a model need not be a change of its matrices: masses at its ends, something hidden that splits a
-mode. Both ways are judged at the measured points: the update where it was given them, the expansion where each was left
-out. Only an update that takes care is replaced, and only by an expansion that predicts better than it meets.
+mode. Both ways are judged at measured points that are left out: half of them by half for the update, one by one for the
+expansion, which costs less. An update that is as near there as any control needs is not replaced, for it names what
+has changed; another one is where the expansion is nearer by more than the errors at the points scatter.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from frf_ipz.updating.shape_expansion.attached_masses import attachment_places, 
 from frf_ipz.updating.shape_expansion.between_points import inner_points
 from frf_ipz.updating.shape_expansion.expanded_model import ExpandedModes, build_expanded_model, expand_modes
 from frf_ipz.updating.shape_expansion.left_out_points import (
+    COVERED,
     FEWEST,
     LeftOutPoints,
     calibrate,
@@ -32,9 +34,12 @@ from frf_ipz.updating.shape_expansion.measured_shapes import gains_of_frfs, meas
 from frf_ipz.updating.shape_expansion.wrong_gains import WrongGain, find_wrong_gains
 
 if TYPE_CHECKING:
-    import pandas as pd
+    from collections.abc import Callable, Collection, Mapping
 
-    from frf_ipz.arrays import BoolArray
+    import pandas as pd
+    from scipy.special import stdtrit
+
+    from frf_ipz.arrays import BoolArray, FloatArray
     from frf_ipz.dofs import AnyDof
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.structure import Geometry, ReducedModel
@@ -45,6 +50,7 @@ if TYPE_CHECKING:
     from frf_ipz.updating.updated_model import UpdatedModel
 else:
     pd = import_late("pandas")
+    stdtrit = import_late("scipy.special", "stdtrit")
 
 MOST_ENDS = 100  # sensors and excited DOFs
 NO_GAIN = WrongGain(log_gain=0.0, std=0.0)
@@ -55,10 +61,11 @@ def with_expanded_shapes(
     fit: ModalFit,
     problem: UpdateProblem,
     *,
+    update_without: Callable[[Collection[AnyDof]], UpdatedModel],
     geometry: Geometry | None,
     options: UpdateOptions,
 ) -> UpdatedModel:
-    """Take expanded measured shapes where they predict left-out points better than the update meets given ones.
+    """Take expanded measured shapes where they predict left-out points better than the update does.
 
     Parameters
     ----------
@@ -68,6 +75,8 @@ def with_expanded_shapes(
         The fitted model of all FRFs.
     problem : UpdateProblem
         The nominal model and the targets.
+    update_without : callable
+        Updates the nominal model without the FRFs of some points.
     geometry : Geometry, optional
         Of the FE model: free ends are seen in it.
     options : UpdateOptions
@@ -83,9 +92,8 @@ def with_expanded_shapes(
         return updated
     if len(measured.outputs) + len(measured.inputs) > MOST_ENDS:
         return updated
-    own = errors_at_points(fit, updated)
-    own_db = float(np.median(own[np.isfinite(own)])) if np.isfinite(own).any() else 0.0
-    if own_db <= SIXTH * GAIN_MARGIN_DB:
+    without = _left_out_of_update(fit, update_without)
+    if not _may_exceed(without, SIXTH * GAIN_MARGIN_DB):
         return updated
     is_known = fit.unknown_scale == "none"
     places = attachment_places(problem.model, measured, geometry)
@@ -93,9 +101,9 @@ def with_expanded_shapes(
     between = tuple(point for point, lies_inside in zip(side_with_more(fit), is_inner, strict=True) if lies_inside)
     causes = _find_causes(fit, problem.model, measured, tuple(dict.fromkeys(((), places))), between)
     loaded, measured, wrong_gains, left_out = min(causes, key=lambda cause: cause.error_db)
-    if left_out is None or np.median(left_out.error_db) >= own_db:
+    if left_out is None or not _is_nearer(left_out, dict(zip(side_with_more(fit), without, strict=True))):
         return updated
-    modes = expand_modes(loaded.model, measured, error=loaded.error, is_scale_known=is_known)
+    modes = expand_modes(loaded.model, measured, error=loaded.error, scatter=loaded.scatter, is_scale_known=is_known)
     if is_known and abs(20 * np.log10(modes.gain)) > HALF * GAIN_MARGIN_DB:
         return updated  # a scale that is so far off where it is known is a mistake, which must show
     inner_nodes, is_inner = inner_points(left_out.points, side_with_more(fit), loaded.model.expanded_dofs, geometry)
@@ -109,7 +117,7 @@ def with_expanded_shapes(
         points=tuple(point.name for point in left_out.points),
         ratio=np.exp(left_out.log_ratio + [gain.log_gain for gain in gains]),
         error_db=left_out.error_db,
-        updated_error_db=own[np.isfinite(own)],
+        updated_error_db=without[np.isfinite(without)],
         stiffness_ratio=loaded.stiffness_ratio,
         masses=loaded.masses,
         split=_split_modes(modes),
@@ -129,6 +137,33 @@ def with_expanded_shapes(
         scale=fit_scale(corrected, _pairs_of_measured_modes(fit), model, fit.model.poles[: fit.n_modes], ensemble),
         expansion=expansion,
     )
+
+
+def _left_out_of_update(fit: ModalFit, update_without: Callable[[Collection[AnyDof]], UpdatedModel]) -> FloatArray:
+    """Errors of an update at points whose half, every other one, it was not given, dB; NaN where nothing is heard."""
+    points = side_with_more(fit)
+    errors = np.full(len(points), np.nan)
+    for first in (0, 1):
+        errors[first::2] = errors_at_points(fit, update_without(points[first::2]))[first::2]
+    return errors
+
+
+def _may_exceed(errors_db: FloatArray, limit_db: float) -> bool:
+    """Tell whether the mean error of points may lie above a limit, by Student's distribution."""
+    known = errors_db[np.isfinite(errors_db)]
+    return len(known) > 1 and float(np.mean(known)) + _chance(known) > limit_db
+
+
+def _chance(values: FloatArray) -> float:
+    """How far the mean of some values may be off by chance."""
+    return float(stdtrit(len(values) - 1, COVERED) * np.std(values, ddof=1) / np.sqrt(len(values)))
+
+
+def _is_nearer(left_out: LeftOutPoints, of_update: Mapping[AnyDof, float]) -> bool:
+    """Tell whether an expansion is nearer at left-out points, by more than Student's distribution gives by chance."""
+    ratios = np.log([of_update[point] / error for point, error in zip(left_out.points, left_out.error_db, strict=True)])
+    ratios = ratios[np.isfinite(ratios)]
+    return len(ratios) > 1 and float(np.mean(ratios)) > _chance(ratios)
 
 
 class _Cause(NamedTuple):
@@ -159,14 +194,14 @@ def _find_causes(
     loaded = [find_attached_masses(model, measured, places) for places in causes]
     wrong: list[dict[AnyDof, WrongGain]] = [{} for _ in causes]
     if between and fit.unknown_scale == "none":
-        wrong = [find_wrong_gains(each.model, measured, between) for each in loaded]
+        wrong = [find_wrong_gains(each.model, measured, between, scatter=each.scatter) for each in loaded]
         common = set.intersection(*(set(each) for each in wrong))
         wrong = [{point: gain for point, gain in each.items() if point in common} for each in wrong]
     found = []
     for places, each, gains in zip(causes, loaded, wrong, strict=True):
         corrected = measured_shapes(fit, wrong_gains=gains) if gains else None
         cause = each if corrected is None else find_attached_masses(model, corrected, places)
-        left_out = leave_points_out(fit, cause.model, error=cause.error, wrong_gains=gains)
+        left_out = leave_points_out(fit, cause.model, error=cause.error, scatter=cause.scatter, wrong_gains=gains)
         found.append(_Cause(cause, corrected or measured, gains, left_out))
     return found
 

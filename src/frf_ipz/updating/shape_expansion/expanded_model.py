@@ -79,7 +79,9 @@ class ExpandedModes:
         return replace(self, shapes=tuple(shape.with_split(log_ratio) for shape, log_ratio in pairs))
 
 
-def expand_modes(model: ReducedModel, measured: MeasuredShapes, *, error: float, is_scale_known: bool) -> ExpandedModes:
+def expand_modes(
+    model: ReducedModel, measured: MeasuredShapes, *, error: float, scatter: float, is_scale_known: bool
+) -> ExpandedModes:
     """Expand all measured modes over a model.
 
     Parameters
@@ -90,6 +92,8 @@ def expand_modes(model: ReducedModel, measured: MeasuredShapes, *, error: float,
         Shapes at sensors and excited DOFs.
     error : float
         Relative error of the measured amplitudes.
+    scatter : float
+        Standard deviation of the logarithms of measured frequencies about those of the model.
     is_scale_known : bool
         Whether the unit of the measurement is that of the model.
 
@@ -98,7 +102,7 @@ def expand_modes(model: ReducedModel, measured: MeasuredShapes, *, error: float,
     ExpandedModes
         With what remains of the model.
     """
-    modal = ModalModel.of(model, measured)
+    modal = ModalModel.of(model, measured, scatter)
     shapes = tuple(expand_shape(modal, measured, mode, error) for mode in range(len(measured.poles)))
     squares = np.array([shape.amplitudes**2 for shape in shapes])
     # rigid-body modes stay: nothing splits them, and how they share their space is up to rounding

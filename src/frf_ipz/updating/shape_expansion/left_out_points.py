@@ -119,7 +119,12 @@ class LeftOutPoints:
 
 
 def leave_points_out(
-    fit: ModalFit, model: ReducedModel, *, error: float, wrong_gains: Mapping[AnyDof, WrongGain] | None = None
+    fit: ModalFit,
+    model: ReducedModel,
+    *,
+    error: float,
+    scatter: float,
+    wrong_gains: Mapping[AnyDof, WrongGain] | None = None,
 ) -> LeftOutPoints | None:
     """Predict each measured point from the others.
 
@@ -131,6 +136,8 @@ def leave_points_out(
         The model over which shapes are expanded.
     error : float
         Relative error of the measured amplitudes.
+    scatter : float
+        Standard deviation of the logarithms of measured frequencies about those of the model.
     wrong_gains : mapping of Dof or PortDof to WrongGain, optional
         Taken off what was measured at these points.
 
@@ -145,7 +152,9 @@ def leave_points_out(
     chosen = [points[place] for place in np.unique(np.linspace(0, len(points) - 1, MOST).round().astype(int))]
     s = _lines(fit)
     measured = _heard(fit, s) / gains_of_frfs(fit, wrong_gains or {}) * gains_of_frfs(fit, {})
-    judge = partial(_judge, fit, model, error=error, wrong_gains=wrong_gains or {}, s=s, measured=measured)
+    judge = partial(
+        _judge, fit, model, error=error, scatter=scatter, wrong_gains=wrong_gains or {}, s=s, measured=measured
+    )
     judged = {point: judge(point, _without(fit, point)) for point in chosen}
     known = {point: judgement for point, judgement in judged.items() if judgement is not None}
     if not known:
@@ -240,6 +249,7 @@ def _judge(
     kept: BoolArray,
     *,
     error: float,
+    scatter: float,
     wrong_gains: Mapping[AnyDof, WrongGain],
     s: ComplexArray,
     measured: ComplexArray,
@@ -250,7 +260,7 @@ def _judge(
     if others is None:
         return None
     is_known = fit.unknown_scale == "none"
-    modes = expand_modes(model, others, error=error, is_scale_known=is_known)
+    modes = expand_modes(model, others, error=error, scatter=scatter, is_scale_known=is_known)
     row = model.row(point) @ modes.model.shapes
     at_point = np.array([row @ shape.amplitudes for shape in modes.shapes])
     variance = np.array([row @ shape.covariance @ row for shape in modes.shapes])

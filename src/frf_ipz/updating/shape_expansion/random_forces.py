@@ -41,15 +41,18 @@ class ModalModel:
         Mass-normalised.
     outputs, inputs : (..., n_outputs, m), (..., n_inputs, m) array
         Shapes at the sensors and at the excited DOFs.
+    scatter : (...) array
+        Standard deviation of the logarithms of measured frequencies about those of the model.
     """
 
     omega: FloatArray
     shapes: FloatArray
     outputs: FloatArray
     inputs: FloatArray
+    scatter: FloatArray
 
     @classmethod
-    def of(cls, model: ReducedModel, measured: MeasuredShapes) -> ModalModel:
+    def of(cls, model: ReducedModel, measured: MeasuredShapes, scatter: float) -> ModalModel:
         """Solve a model for its modes.
 
         Parameters
@@ -58,17 +61,19 @@ class ModalModel:
             The model.
         measured : MeasuredShapes
             Names the sensors and excited DOFs.
+        scatter : float
+            Standard deviation of the logarithms of measured frequencies about those of the model.
 
         Returns
         -------
         ModalModel
             All of its modes.
         """
-        return cls.of_matrices(model.mass, model.stiffness, *rows_of_ends(model, measured))
+        return cls.of_matrices(model.mass, model.stiffness, *rows_of_ends(model, measured), np.asarray(scatter))
 
     @classmethod
     def of_matrices(
-        cls, mass: FloatArray, stiffness: FloatArray, outputs: FloatArray, inputs: FloatArray
+        cls, mass: FloatArray, stiffness: FloatArray, outputs: FloatArray, inputs: FloatArray, scatter: FloatArray
     ) -> ModalModel:
         """Solve models for their modes.
 
@@ -78,6 +83,8 @@ class ModalModel:
             Of each.
         outputs, inputs : (n_outputs, r), (n_inputs, r) array
             Rows of the sensors and excited DOFs.
+        scatter : (...) array
+            Of each, of the logarithms of measured frequencies.
 
         Returns
         -------
@@ -86,7 +93,7 @@ class ModalModel:
         """
         squares, shapes = modes_of_stack(mass, (stiffness + stiffness.swapaxes(-1, -2)) / 2)
         omega = np.sqrt(np.maximum(squares, 0.0))
-        return cls(omega=omega, shapes=shapes, outputs=outputs @ shapes, inputs=inputs @ shapes)
+        return cls(omega=omega, shapes=shapes, outputs=outputs @ shapes, inputs=inputs @ shapes, scatter=scatter)
 
 
 def rows_of_ends(model: ReducedModel, measured: MeasuredShapes) -> tuple[FloatArray, FloatArray]:
@@ -226,7 +233,8 @@ def field_at_points(model: ModalModel, measured: MeasuredShapes, mode: int) -> F
     rows = np.concatenate([model.outputs, model.inputs], axis=-2)
     n_outputs, n_inputs = model.outputs.shape[-2], model.inputs.shape[-2]
     omega, damping = measured.omega[mode], max(float(measured.damping[mode]), LEAST_DAMPING)
-    power = 1 / np.abs(model.omega**2 - omega**2 + 2j * damping * model.omega * omega) ** 2
+    width = np.hypot(damping, np.asarray(model.scatter)[..., None])
+    power = 1 / np.abs(model.omega**2 - omega**2 + 2j * width * model.omega * omega) ** 2
     power = power / np.mean(rows**2 @ power[..., None], axis=-2)
     prior = (rows * power[..., None, :]) @ rows.swapaxes(-1, -2)
     sizes = np.diagonal(prior, axis1=-2, axis2=-1)

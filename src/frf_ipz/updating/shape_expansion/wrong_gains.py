@@ -60,7 +60,7 @@ class WrongGain:
 
 
 def find_wrong_gains(
-    model: ReducedModel, measured: MeasuredShapes, candidates: Collection[AnyDof]
+    model: ReducedModel, measured: MeasuredShapes, candidates: Collection[AnyDof], *, scatter: float
 ) -> dict[AnyDof, WrongGain]:
     """Find points whose gain is wrong, of the side of the test that has more.
 
@@ -73,6 +73,8 @@ def find_wrong_gains(
     candidates : collection of Dof or PortDof
         Points that may be wrong. One beyond all others is not among them: what the model lacks there, a mass at an end,
         makes all modes smaller too.
+    scatter : float
+        Standard deviation of the logarithms of measured frequencies about those of the model.
 
     Returns
     -------
@@ -82,7 +84,7 @@ def find_wrong_gains(
     is_output = len(measured.outputs) >= len(measured.inputs)
     points = measured.outputs if is_output else measured.inputs
     first = 0 if is_output else len(measured.outputs)
-    modal = ModalModel.of(model, measured)
+    modal = ModalModel.of(model, measured, scatter)
     wrong: dict[AnyDof, WrongGain] = {}
     while 2 * (len(wrong) + 1) < len(points):
         log_factors, gains, stds = _compare(modal, measured, is_output=is_output)

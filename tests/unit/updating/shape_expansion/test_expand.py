@@ -8,10 +8,13 @@ from scipy import sparse
 
 import frf_ipz
 from frf_ipz.export.state_space import make_state_space
+from frf_ipz.updating.problem import make_problem
 from frf_ipz.updating.shape_expansion.attached_masses import attachment_places, find_attached_masses
+from frf_ipz.updating.shape_expansion.expand import with_expanded_shapes
 from frf_ipz.updating.shape_expansion.expanded_model import build_expanded_model, expand_modes
 from frf_ipz.updating.shape_expansion.left_out_points import ShapeErrors, calibrate, leave_points_out
 from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes
+from frf_ipz.updating.shape_expansion.random_forces import ModalModel, field_at_points
 from frf_testbench.updating.synthetic_fit import TrueModes, simulate_fit
 
 END_KG, TRANSDUCER_KG = 0.010, 0.006
@@ -122,7 +125,7 @@ def test_sensors_that_see_more_than_what_excites_them_are_told_by_points_on_both
     residues = fit.model.residues.copy()
     residues[: fit.n_modes] *= seen_besides
     besides = replace(fit, model=replace(fit.model, residues=residues))
-    holds, fails = (leave_points_out(each, reduced_model, error=0.03) for each in (fit, besides))
+    holds, fails = (leave_points_out(each, reduced_model, error=0.03, scatter=0.03) for each in (fit, besides))
     on_both = [point in ACTUATORS for point in holds.points]
     assert len(holds.reciprocal) == sum(on_both)
     assert not holds.is_told.any()  # with another actuator each can be left out on both sides
@@ -194,6 +197,34 @@ def test_an_update_that_meets_the_measurement_stays(left_out):
     assert len(updated.model.dofs) == len(left_out[1].dofs)
 
 
+@pytest.mark.parametrize("is_near", [True, False])
+def test_an_update_is_judged_by_points_that_it_was_not_given(left_out, expanded, is_near):
+    fit, reduced_model, *_ = left_out
+    plain = frf_ipz.update_model(fit, reduced_model, options=frf_ipz.UpdateOptions(expand=False, ensemble=0))
+    chosen = with_expanded_shapes(
+        plain,
+        fit,
+        make_problem(reduced_model, fit, frf_ipz.pair_roots(fit, reduced_model), None),
+        update_without=lambda _: expanded if is_near else plain,
+        geometry=make_nominal().geometry,
+        options=frf_ipz.UpdateOptions(ensemble=2),
+    )
+    assert (chosen is plain) == is_near
+
+
+def test_a_model_frequency_at_a_measured_one_makes_no_shape_surer(left_out):
+    """A model is known to within the scatter of its frequencies: which of them is met by chance is no knowledge."""
+    fit, reduced_model, *_ = left_out
+    measured = measured_shapes(fit)
+    scatter, mode = 0.05, 2
+    modal = ModalModel.of(reduced_model, measured, scatter)
+    place = int(np.argmin(np.abs(modal.omega - measured.omega[mode])))
+    omega = modal.omega * measured.omega[mode] / modal.omega[place]
+    power = field_at_points(replace(modal, omega=omega), measured, mode).power
+    gap = 1 - (omega[place + 1] / omega[place]) ** 2
+    assert power[place] / power[place + 1] == pytest.approx((gap / (2 * scatter)) ** 2, rel=0.1)
+
+
 def test_no_measured_mode_takes_the_place_of_a_rigid_body_mode(left_out):
     """The two of a free beam share their space up to rounding, which would decide what is predicted."""
     fit, reduced_model, *_ = left_out
@@ -201,7 +232,7 @@ def test_no_measured_mode_takes_the_place_of_a_rigid_body_mode(left_out):
     at_outputs, at_inputs = measured.at_outputs.copy(), measured.at_inputs.copy()
     at_outputs[0], at_inputs[0] = 1 / np.sqrt(len(measured.outputs)), 1 / np.sqrt(len(measured.inputs))
     moved = replace(measured, at_outputs=at_outputs, at_inputs=at_inputs)
-    modes = expand_modes(reduced_model, moved, error=0.05, is_scale_known=True)
+    modes = expand_modes(reduced_model, moved, error=0.05, scatter=0.03, is_scale_known=True)
     assert reduced_model.rigid.shape[1] == 2
     assert modes.amplitudes[:2, 0] @ modes.amplitudes[:2, 0] > 0.5 * (modes.amplitudes[:, 0] @ modes.amplitudes[:, 0])
     assert modes.remains[:2].all()
@@ -263,7 +294,7 @@ def struck_far_from_the_sensor():
     fit = simulate_fit(truth, labels, BAND_HZ, rng=np.random.default_rng(5))
     reduced_model = frf_ipz.reduce_model(fit, make_nominal())
     measured = measured_shapes(fit)
-    modes = expand_modes(reduced_model, measured, error=1e-3, is_scale_known=True)
+    modes = expand_modes(reduced_model, measured, error=1e-3, scatter=0.03, is_scale_known=True)
     model, members = build_expanded_model(reduced_model, modes, count=60, calibration=1.0, seed=0)
     return modes, model, members, sensor, struck
 

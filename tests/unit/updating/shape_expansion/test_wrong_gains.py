@@ -51,7 +51,7 @@ def with_gain(fit, point, gain):
 @pytest.mark.parametrize("gain", [0.85, 1.25, 9.81])
 def test_a_wrong_gain_is_found_with_its_deviation(measurement, gain):
     fit, reduced_model = measurement
-    wrong = find_wrong_gains(reduced_model, measured_shapes(with_gain(fit, WRONG, gain)), POINTS[1:-1])
+    wrong = find_wrong_gains(reduced_model, measured_shapes(with_gain(fit, WRONG, gain)), POINTS[1:-1], scatter=0.03)
     assert list(wrong) == [WRONG]
     assert wrong[WRONG].log_gain == pytest.approx(np.log(gain), abs=3 * wrong[WRONG].std)
     assert wrong[WRONG].std < 0.05
@@ -59,19 +59,19 @@ def test_a_wrong_gain_is_found_with_its_deviation(measurement, gain):
 
 def test_tolerances_are_no_wrong_gain(measurement):
     fit, reduced_model = measurement
-    assert find_wrong_gains(reduced_model, measured_shapes(fit), POINTS[1:-1]) == {}
+    assert find_wrong_gains(reduced_model, measured_shapes(fit), POINTS[1:-1], scatter=0.03) == {}
 
 
 def test_a_point_beyond_all_others_is_not_judged(measurement):
     fit, reduced_model = measurement
     measured = measured_shapes(with_gain(fit, POINTS[0], 0.85))
-    assert find_wrong_gains(reduced_model, measured, POINTS[1:-1]) == {}
+    assert find_wrong_gains(reduced_model, measured, POINTS[1:-1], scatter=0.03) == {}
 
 
 def test_a_wrong_gain_is_taken_off(measurement):
     fit, reduced_model = measurement
     off = with_gain(fit, WRONG, 0.5)
-    wrong = find_wrong_gains(reduced_model, measured_shapes(off), POINTS[1:-1])
+    wrong = find_wrong_gains(reduced_model, measured_shapes(off), POINTS[1:-1], scatter=0.03)
     corrected, right = measured_shapes(off, wrong_gains=wrong), measured_shapes(fit)
     np.testing.assert_allclose(np.abs(corrected.at_inputs), np.abs(right.at_inputs), rtol=0, atol=0.05)
     assert corrected.doubt[1 + POINTS.index(WRONG)] == wrong[WRONG].std ** 2
@@ -83,7 +83,9 @@ def test_the_density_of_directions_is_one():
     root = rng.normal(size=(3, 3))
     field = FieldAtPoints(rows=root, power=np.ones(3), prior=root @ root.T, unit_variance=np.ones(3), own=np.zeros(3))
     sides = {"outputs": np.ones((1, 3)), "inputs": np.ones((2, 3))}
-    density = DirectionDensity.of(ModalModel(omega=np.ones(3), shapes=np.eye(3), **sides), is_output=False)
+    density = DirectionDensity.of(
+        ModalModel(omega=np.ones(3), shapes=np.eye(3), scatter=np.float64(0.03), **sides), is_output=False
+    )
     log_gains = np.log([0.2, 5.0])
     sums = np.zeros(3)
     for angle in np.linspace(0.0, np.pi, 400, endpoint=False):
