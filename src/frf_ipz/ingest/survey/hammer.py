@@ -63,11 +63,10 @@ def survey_hammer(files: RecordingFiles, options: IngestOptions, progress: Progr
     survey = _plan(indices, records, options)
     compared_records, pairwise = compare_impacts(files, survey)
     if any(after.marks != before.marks for after, before in zip(compared_records, survey.records, strict=True)):
-        scales = {record.name: record.noise_scales for record in compared_records}
         compared = {record.name: record for record in compared_records}
         marked_records = [_with_contradictions(record, compared[record.name]) for record in records]
         survey = _plan(indices, marked_records, options)
-        compared_records = tuple(replace(record, noise_scales=scales[record.name]) for record in survey.records)
+        compared_records = tuple(_with_noise(record, compared[record.name]) for record in survey.records)
     return replace(survey, records=compared_records, warnings=(*survey.warnings, *pairwise))
 
 
@@ -79,6 +78,16 @@ def _with_contradictions(record: RecordInfo, compared: RecordInfo) -> RecordInfo
         faults=(*record.faults, *faults),
         channel_faults=compared.channel_faults,
         is_unlike=compared.is_unlike,
+    )
+
+
+def _with_noise(record: RecordInfo, compared: RecordInfo) -> RecordInfo:
+    """Add the noise that the comparison with the other impacts has found."""
+    return replace(
+        record,
+        noise_weights=compared.noise_weights,
+        noise_scales=compared.noise_scales,
+        remarks=tuple(dict.fromkeys((*record.remarks, *compared.remarks))),
     )
 
 

@@ -68,8 +68,11 @@ class RecordInfo:
         Samples of the force that its record lacks because it begins within the pulse, N.
     lacks_most : bool
         Its record begins so late in the pulse that nothing is known of the force.
+    noise_weights : tuple of tuples of float
+        For each response, the weight of this impact on points from 0 Hz to half of the sampling rate, equally spaced;
+        the mean over the impacts is 1. Empty where they cannot be compared.
     noise_scales : tuple of float
-        Noise power of each response over that of the other impacts; empty where they cannot be compared.
+        Noise power of each response over that of the other impacts, under these weights; empty as they are.
     period : int
         Samples after which the force of a shaker comes again; 0 where it does not.
     is_unlike : bool
@@ -104,6 +107,7 @@ class RecordInfo:
     keeps_channels: bool = False
     missing_force: tuple[float, ...] = (0.0,)
     lacks_most: bool = False
+    noise_weights: tuple[tuple[float, ...], ...] = ()
     noise_scales: tuple[float, ...] = ()
     period: int = 0
     is_unlike: bool = False
