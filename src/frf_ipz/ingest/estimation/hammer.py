@@ -85,7 +85,8 @@ def _add_noise(
     window, decay = impact_windows(record.n_samples, record.force_interval, rate, record.trigger)
     responses = [noise_power(response[record.trigger :], record.step_s, frequency_hz) for response in record.responses]
     scales = np.array(info.noise_scales)[rows, None] if info.noise_scales else np.ones((len(rows), 1))
-    noise.response[rows] += weights * np.array(responses) * np.sum(decay**2)
+    spikes = np.array([[info.spike_power(output, decay)] for output in rows])
+    noise.response[rows] += weights * (np.array(responses) * np.sum(decay**2) + spikes)
     force_noise = noise_power(record.force[record.trigger :], record.step_s, frequency_hz)
     noise.force[rows] += weights * force_noise * np.sum(window**2)
     noise.scales[rows] += scales

@@ -95,7 +95,8 @@ def _transform(files: RecordingFiles, survey: Survey, records: Sequence[RecordIn
             noise_power(response[record.trigger : record.n_samples], record.step_s, frequency_hz)
             for response in unwindowed
         ]
-        noises.append(np.nan_to_num(np.array(noise)) * np.sum(window**2))
+        spikes = [[record.spike_power(output, window)] for output in range(len(noise))]
+        noises.append(np.nan_to_num(np.array(noise)) * np.sum(window**2) + np.array(spikes))
         force_noises.append(record.force_noise**2 * np.sum(force_window**2))
     outputs = range(len(records[0].setup.output_dofs))
     valid = np.array([[output in record.used_outputs for output in outputs] for record in records])
@@ -115,7 +116,7 @@ def _windowed(
         in_file = list(group)
         segments = files.segments(in_file[0].setup, path, [(record.start, record.stop) for record in in_file])
         for record, segment in zip(in_file, segments, strict=True):
-            signals = segment[1:] - np.array(record.offsets)[:, None]
+            signals = record.correct(segment[1:])
             decay = survey.decay_1_s * record.step_s
             yield record, window_impact(signals, survey.n_samples, record.force_interval, decay, record.trigger)
 

@@ -153,6 +153,7 @@ def _without_long_lead(record: RecordInfo) -> RecordInfo:
         start=record.start + cut,
         trigger=record.trigger - cut,
         pulse_interval=(start - cut, stop - cut),
+        spikes=tuple(replace(spike, start=spike.start - cut) for spike in record.spikes),
         force_interval=(0, record.n_samples - cut),
     )
 

@@ -59,7 +59,7 @@ def noise_weights(force: ComplexArray, response: ComplexArray, relative: FloatAr
     >>> relative = np.array([0.01, 0.01, 5.76])[:, None] * np.full(200, 0.52)
     >>> weights = noise_weights(np.ones((3, 200), complex), 1.0 + noise, relative, 1.0)
     >>> weights.mean(axis=1).round(2)
-    array([1.5, 1.5, 0. ])
+    array([1.5 , 1.5 , 0.01])
     """
     n_lines = force.shape[1]
     bands, shares = overlapping_bands(n_lines, BAND)

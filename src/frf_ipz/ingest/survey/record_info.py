@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
 from frf_ipz.ingest.campaign import TestSetup
+from frf_ipz.ingest.signals.spikes import Spike
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +77,8 @@ class RecordInfo:
         the mean over the impacts is 1. Empty where they cannot be compared.
     noise_scales : tuple of float
         Noise power of each response over that of the other impacts, under these weights; empty as they are.
+    spikes : tuple of Spike
+        Jumps in its responses that no band-limited motion makes, from `start`; they are taken off.
     period : int
         Samples after which the force of a shaker comes again; 0 where it does not.
     is_unlike : bool
@@ -109,6 +115,7 @@ class RecordInfo:
     lacks_most: bool = False
     noise_weights: tuple[tuple[float, ...], ...] = ()
     noise_scales: tuple[float, ...] = ()
+    spikes: tuple[Spike, ...] = ()
     period: int = 0
     is_unlike: bool = False
 
@@ -116,6 +123,43 @@ class RecordInfo:
     def n_samples(self) -> int:
         """Number of samples."""
         return self.stop - self.start
+
+    def spike_power(self, output: int, window: FloatArray) -> float:
+        """Give the mean squared modulus of what the errors of the spikes of a response add to its transform.
+
+        Parameters
+        ----------
+        output : int
+            Which response, by its place in the set-up.
+        window : (n_samples,) array
+            What the response is multiplied by.
+
+        Returns
+        -------
+        float
+            0 where it has none.
+        """
+        inside = [spike for spike in self.spikes if spike.output == output and spike.start < len(window)]
+        return float(sum(spike.error * window[spike.start] ** 2 for spike in inside))
+
+    def correct(self, signals: FloatArray) -> FloatArray:
+        """Take offsets and spikes off.
+
+        Parameters
+        ----------
+        signals : (1 + n_outputs, n_samples) array
+            Force and responses as recorded, SI.
+
+        Returns
+        -------
+        (1 + n_outputs, n_samples) array
+            Corrected.
+        """
+        corrected = signals - np.array(self.offsets)[:, None]
+        for spike in self.spikes:
+            part = corrected[1 + spike.output, spike.start : spike.start + len(spike.values)]
+            part -= spike.values[: len(part)]
+        return np.asarray(corrected)
 
     @property
     def ringing_s(self) -> float:
