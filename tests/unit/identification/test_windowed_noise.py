@@ -1,4 +1,4 @@
-"""Noise under an exponential window is alike on neighbouring lines, also where each is nearly as good as independent."""
+"""Noise under an exponential window is alike on neighbouring lines, also where the window is weak."""
 
 import numpy as np
 

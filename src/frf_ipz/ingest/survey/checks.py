@@ -81,6 +81,7 @@ def check_impact(
         offsets = tuple(_estimate_offset(response[: max(start, 0)]) for response in responses)
     decays = _measure_decays(test, index.step_s, responses - np.array(offsets)[:, None], trigger)
     slowest = max(decays, key=lambda decay: decay.remaining_amplitude)
+    cut_off = max(decays, key=lambda decay: decay.cut_off_ratio)
     snr_db = _measure_snr_db(responses - np.array(offsets)[:, None], trigger, decays)
     channel_faults = _find_bad_channels(test, index.step_s, responses, max(start, 0))
     bad_outputs = {output for output, _ in channel_faults}
@@ -111,6 +112,9 @@ def check_impact(
         second_pulse_ratio=float(pulse.ratios.max(initial=0.0)),
         remaining_amplitude=slowest.remaining_amplitude,
         slowest_mode_hz=slowest.frequency_hz,
+        cut_off_ratio=cut_off.cut_off_ratio,
+        cut_off_amplitude=cut_off.cut_off_amplitude,
+        cut_off_hz=cut_off.cut_off_hz,
         snr_db=snr_db,
         faults=(
             *_find_late_start(force, pulse, missing_force, lacks_most=lacks_most),

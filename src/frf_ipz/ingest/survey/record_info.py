@@ -52,6 +52,9 @@ class RecordInfo:
         Share of its amplitude that the slowest mode still has at the end.
     slowest_mode_hz : float
         That mode's frequency, Hz.
+    cut_off_ratio, cut_off_amplitude, cut_off_hz : float
+        What the end of the record cuts off of a mode, over the deviation of its noise; the share of its amplitude that
+        this mode still has there, and its frequency, Hz.
     snr_db : float
         Power of the response over its noise, median of the channels, dB; NaN where the noise is not known.
     starts_at_rest : bool
@@ -103,6 +106,9 @@ class RecordInfo:
     second_pulse_ratio: float = 0.0
     remaining_amplitude: float = 0.0
     slowest_mode_hz: float = 0.0
+    cut_off_ratio: float = 0.0
+    cut_off_amplitude: float = 0.0
+    cut_off_hz: float = 0.0
     snr_db: float = float("nan")
     starts_at_rest: bool = True
     number: int = 1
