@@ -277,7 +277,7 @@ def _shared_noise_factors(frfs: FrfSet, fitted: FittedModes) -> FloatArray:
     is_alone &= fitted.force_error is None or fitted.lines.force_noise is not None
     if fitted.poles_are_held or not is_alone:
         return np.ones(2 * len(fitted.fit.poles))
-    windowed_s = 1 / float(np.median(np.diff(frfs.frequency_hz))) if frfs.correlated_lines > 1 else 0.0
+    windowed_s = 1 / float(np.median(np.diff(frfs.frequency_hz))) if frfs.window_decay_1_s > 0.0 else 0.0
     return shared_noise_factors(fitted.lines, fitted.fit, fitted.terms, windowed_s=windowed_s)
 
 

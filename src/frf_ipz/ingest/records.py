@@ -176,7 +176,7 @@ def read_records(files: RecordingFiles, options: IngestOptions, *, used_only: bo
 
 
 def _make_record(test: VibrationTest, info: RecordInfo, signals: FloatArray) -> Record:
-    signals = signals[1:] - np.array(info.offsets)[:, None]
+    signals = info.correct(signals[1:])
     labels = setup_labels(test.channels, info.setup)
     outputs = info.used_outputs if info.used else tuple(range(len(labels)))
     return Record(

@@ -93,6 +93,19 @@ def test_decays_that_are_cut_off_get_the_window_they_need(tmp_path):
     assert any("is cut off" in warning for warning in truncated.warnings)
 
 
+def test_a_decay_is_cut_off_where_what_is_missing_exceeds_the_noise(tmp_path):
+    structure = Structure(damping_ratio=(0.0186, 0.02, 0.012))  # 0.8 in 1000 of the first mode remains
+    windows = []
+    for noise in (0.002, 2.0):
+        frfs = estimate(hammer_campaign(tmp_path / str(noise), structure=structure, noise=noise, seed=1)).frfs
+        band = frfs.in_band(BAND_HZ)
+        over_std = np.abs(frfs.values[band] - structure.accelerance(frfs.s[band])) / np.sqrt(frfs.variance[band])
+        assert np.sqrt(np.mean(over_std**2)) == pytest.approx(1.0, abs=0.2)  # 7 in the quiet test without a window
+        windows.append(frfs.window_decay_1_s)
+    assert windows[0] > 0.0
+    assert windows[1] == 0.0
+
+
 def test_an_exponential_window_does_not_magnify_what_precedes_the_pulse(tmp_path):
     rng = np.random.default_rng(2)
     for number in range(3):

@@ -12,7 +12,7 @@ from frf_ipz.ingest.signals.decay import noise_power
 from frf_ipz.ingest.signals.windows import exponential_window, impact_windows
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import ComplexArray
+    from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.ingest.estimation.averaging import SetupAverage
     from frf_ipz.ingest.estimation.impact_noise import ImpactNoise
     from frf_ipz.ingest.frf_estimate import FrfEstimate
@@ -52,25 +52,45 @@ def _add_impact(average: SetupAverage, info: RecordInfo, record: Record, survey:
     """Add an impact to the average of its set-up, and return the energy of its force."""
     signals = record.apply_windows(survey.decay_1_s, survey.n_samples)
     rows = list(record.outputs)
-    average.sums.add(signals[0], signals[1:], rows)
+    weights = _weights(info, survey.n_samples // 2 + 1)[rows]
+    average.sums.add(signals[0], signals[1:], rows, weights)
     average.independent[rows] += 1.0
     average.noise = average.noise or empty_noise(survey.n_samples // 2 + 1, len(average.sums.cross))
-    _add_noise(average.noise, info, record, survey, np.fft.rfft(signals[0]))
-    return float(np.sum(signals[0] ** 2))
+    spectrum = np.fft.rfft(signals[0])
+    _add_noise(average.noise, info, record, survey, spectrum, weights)
+    share = np.mean(np.average(weights, axis=1, weights=np.abs(spectrum) ** 2)) if np.any(spectrum) else 0.0
+    return float(share * np.sum(signals[0] ** 2))
 
 
-def _add_noise(noise: ImpactNoise, info: RecordInfo, record: Record, survey: Survey, spectrum: ComplexArray) -> None:
-    """Add what is known of the noise of an impact; `spectrum` is that of its force."""
+def _weights(info: RecordInfo, n_lines: int) -> FloatArray:
+    """Weights of an impact for all responses of its set-up, (n_outputs, n_lines)."""
+    if not info.noise_weights:
+        return np.ones((len(info.setup.output_dofs), n_lines))
+    lines = np.linspace(0.0, 1.0, n_lines)
+    return np.array([np.interp(lines, np.linspace(0.0, 1.0, len(row)), row) for row in info.noise_weights])
+
+
+def _add_noise(
+    noise: ImpactNoise,
+    info: RecordInfo,
+    record: Record,
+    survey: Survey,
+    spectrum: ComplexArray,
+    weights: FloatArray,
+) -> None:
+    """Add what is known of the noise of an impact; `spectrum` is that of its force, `weights` are its own."""
     rows, force = list(record.outputs), np.abs(spectrum)
     frequency_hz = np.asarray(np.fft.rfftfreq(survey.n_samples, record.step_s))
     rate = survey.decay_1_s * record.step_s
     window, decay = impact_windows(record.n_samples, record.force_interval, rate, record.trigger)
     responses = [noise_power(response[record.trigger :], record.step_s, frequency_hz) for response in record.responses]
     scales = np.array(info.noise_scales)[rows, None] if info.noise_scales else np.ones((len(rows), 1))
-    noise.response[rows] += np.array(responses) * np.sum(decay**2)
-    noise.force[rows] += noise_power(record.force[record.trigger :], record.step_s, frequency_hz) * np.sum(window**2)
+    spikes = np.array([[info.spike_power(output, decay)] for output in rows])
+    noise.response[rows] += weights * (np.array(responses) * np.sum(decay**2) + spikes)
+    force_noise = noise_power(record.force[record.trigger :], record.step_s, frequency_hz)
+    noise.force[rows] += weights * force_noise * np.sum(window**2)
     noise.scales[rows] += scales
-    noise.scaled_force[rows] += scales * force**2
+    noise.scaled_force[rows] += scales * weights * force**2
     noise.pulse[rows] += force * spectrum * np.exp(2j * np.pi * frequency_hz * record.trigger * record.step_s)
     if any(info.missing_force):
         count = len(info.missing_force)
@@ -79,5 +99,5 @@ def _add_noise(noise: ImpactNoise, info: RecordInfo, record: Record, survey: Sur
         missing = spectrum.conj() * np.fft.rfft(lost, survey.n_samples) * earlier
         first = slice(0, count + 1)
         sizes = np.linalg.norm(record.responses[:, first], axis=1)
-        noise.missing_force[rows] += missing
-        noise.missing_response[rows] += np.abs(missing) * sizes[:, None] / np.linalg.norm(record.force[first])
+        noise.missing_force[rows] += weights * missing
+        noise.missing_response[rows] += weights * np.abs(missing) * sizes[:, None] / np.linalg.norm(record.force[first])

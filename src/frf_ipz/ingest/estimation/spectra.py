@@ -39,7 +39,13 @@ class SpectrumSums:
     responses: FloatArray
     counts: IntArray
 
-    def add(self, force: FloatArray, responses: FloatArray, rows: Sequence[int] | None = None) -> None:
+    def add(
+        self,
+        force: FloatArray,
+        responses: FloatArray,
+        rows: Sequence[int] | None = None,
+        weights: FloatArray | float = 1.0,
+    ) -> None:
         """Add one record.
 
         Parameters
@@ -50,6 +56,8 @@ class SpectrumSums:
             With theirs.
         rows : sequence of int, optional
             Which responses these are; all of them where it is left out.
+        weights : (n_rows, n_lines) array or float
+            How much the record counts.
 
         Raises
         ------
@@ -59,9 +67,15 @@ class SpectrumSums:
         n_rows = len(self.cross) if rows is None else len(rows)
         require_shape("the responses of a record", responses, (n_rows, len(force)))
         require_shape("the spectrum of a record", self.force, (len(self.force), len(force) // 2 + 1))
-        self.add_spectra(np.fft.rfft(force), np.fft.rfft(responses), rows)
+        self.add_spectra(np.fft.rfft(force), np.fft.rfft(responses), rows, weights)
 
-    def add_spectra(self, force: ComplexArray, responses: ComplexArray, rows: Sequence[int] | None = None) -> None:
+    def add_spectra(
+        self,
+        force: ComplexArray,
+        responses: ComplexArray,
+        rows: Sequence[int] | None = None,
+        weights: FloatArray | float = 1.0,
+    ) -> None:
         """Add the spectra of one record or segment.
 
         Parameters
@@ -72,11 +86,13 @@ class SpectrumSums:
             Transforms of the responses.
         rows : sequence of int, optional
             Which responses these are; all of them where it is left out.
+        weights : (n_rows, n_lines) array or float
+            How much the record counts.
         """
         chosen = slice(None) if rows is None else list(rows)
-        self.force[chosen] += force.real**2 + force.imag**2
-        self.responses[chosen] += responses.real**2 + responses.imag**2
-        self.cross[chosen] += force.conj() * responses
+        self.force[chosen] += weights * (force.real**2 + force.imag**2)
+        self.responses[chosen] += weights * (responses.real**2 + responses.imag**2)
+        self.cross[chosen] += weights * (force.conj() * responses)
         self.counts[chosen] += 1
 
     def take(self, rows: Sequence[int]) -> SpectrumSums:

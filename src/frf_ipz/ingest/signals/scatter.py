@@ -54,7 +54,7 @@ def fit_noise_power(scatter: FloatArray, gain: FloatArray, degrees: float) -> Fl
     """
     if not scatter.any():
         return np.zeros_like(scatter)
-    bands, weights = _overlapping_bands(len(scatter), max(FEWEST_LINES, round(DEGREES / degrees)))
+    bands, weights = overlapping_bands(len(scatter), max(FEWEST_LINES, round(DEGREES / degrees)))
     limit = special.gammainccinv(degrees, OUTLIERS / len(scatter)) / degrees
     used = np.ones_like(scatter)
     power = np.empty_like(scatter)
@@ -68,8 +68,21 @@ def fit_noise_power(scatter: FloatArray, gain: FloatArray, degrees: float) -> Fl
     return np.where(used > 0, power, scatter)
 
 
-def _overlapping_bands(n_lines: int, width: int) -> tuple[IntArray, FloatArray]:
-    """Lay overlapping bands over the lines: lines and weights, (n_bands, width); weights add up to 1 at every line."""
+def overlapping_bands(n_lines: int, width: int) -> tuple[IntArray, FloatArray]:
+    """Lay overlapping bands over the lines.
+
+    Parameters
+    ----------
+    n_lines : int
+        Lines.
+    width : int
+        Lines of a band.
+
+    Returns
+    -------
+    lines, weights : (n_bands, width) arrays
+        Which lines are in each, and how much they count; the weights add up to 1 at every line.
+    """
     if n_lines <= width:
         return np.arange(n_lines)[None], np.ones((1, n_lines))
     hop = width // 2

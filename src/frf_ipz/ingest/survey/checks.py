@@ -11,6 +11,7 @@ from frf_ipz.ingest.signals.decay import Decay, measure_decay
 from frf_ipz.ingest.signals.faults import MOST_MISSING, find_dropout, find_missing_force, is_settling
 from frf_ipz.ingest.signals.periods import find_period
 from frf_ipz.ingest.signals.pulses import find_pulse, force_band, pulse_extent
+from frf_ipz.ingest.signals.spikes import find_spikes, in_one_response
 from frf_ipz.ingest.survey.record_info import RecordInfo
 from frf_ipz.ingest.units import si_unit
 from frf_ipz.quantities import RESPONSES
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.campaign import VibrationTest
     from frf_ipz.ingest.signals.pulses import Pulse
+    from frf_ipz.ingest.signals.spikes import Spike
     from frf_ipz.ingest.survey.file_index import FileIndex
 
 SECOND_PULSE = 0.04  # of the first: smaller ones are no second hit
@@ -79,7 +81,18 @@ def check_impact(
         offsets = tuple(_estimate_offset(response[: max(start, 0)]) for response in responses)
     decays = _measure_decays(test, index.step_s, responses - np.array(offsets)[:, None], trigger)
     slowest = max(decays, key=lambda decay: decay.remaining_amplitude)
+    cut_off = max(decays, key=lambda decay: decay.cut_off_ratio)
     snr_db = _measure_snr_db(responses - np.array(offsets)[:, None], trigger, decays)
+    channel_faults = _find_bad_channels(test, index.step_s, responses, max(start, 0))
+    bad_outputs = {output for output, _ in channel_faults}
+    spikes = in_one_response(
+        [
+            spike
+            for output, response in enumerate(responses)
+            if output not in bad_outputs
+            for spike in find_spikes(response, output, stop)
+        ]
+    )
     return RecordInfo(
         name=name,
         setup=index.setup,
@@ -99,16 +112,21 @@ def check_impact(
         second_pulse_ratio=float(pulse.ratios.max(initial=0.0)),
         remaining_amplitude=slowest.remaining_amplitude,
         slowest_mode_hz=slowest.frequency_hz,
+        cut_off_ratio=cut_off.cut_off_ratio,
+        cut_off_amplitude=cut_off.cut_off_amplitude,
+        cut_off_hz=cut_off.cut_off_hz,
         snr_db=snr_db,
         faults=(
             *_find_late_start(force, pulse, missing_force, lacks_most=lacks_most),
             *_find_double_hit(pulse, index.step_s),
             *_find_clipping(test, force),
         ),
-        channel_faults=_find_bad_channels(test, index.step_s, responses, max(start, 0)),
+        channel_faults=channel_faults,
         missing_force=missing_force,
         lacks_most=lacks_most,
+        spikes=spikes,
         remarks=(
+            *_find_jumps(test, spikes, rows[0], index.step_s),
             *_find_cut_off_decay(slowest),
             *_find_weak_impact(pulse, snr_db),
             *_find_initial_motion(test, responses, offsets, start),
@@ -249,6 +267,19 @@ def _measure_decays(test: VibrationTest, step_s: float, responses: FloatArray, t
         measure_decay(response[trigger:], step_s, RESPONSES.index(channel.quantity))
         for channel, response in zip(test.output_channels, responses, strict=True)
     ]
+
+
+def _find_jumps(test: VibrationTest, spikes: tuple[Spike, ...], start: int, step_s: float) -> tuple[str, ...]:
+    texts = []
+    for output, channel in enumerate(test.output_channels):
+        times_s = [(start + spike.start) * step_s for spike in spikes if spike.output == output]
+        if times_s:
+            others = f", and {len(times_s) - 1} times more" if len(times_s) > 1 else ""
+            texts.append(
+                f"{channel.column} jumps {times_s[0]:.4g} s after the beginning of its recording{others}, as no "
+                "structure moves (a loose cable?): taken off"
+            )
+    return tuple(texts)
 
 
 def _find_cut_off_decay(slowest: Decay) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from frf_ipz.ingest.survey.contradictions import (
     difference_of_pair,
     follows_force,
     leave_out,
-    noise_scales,
+    weigh_impacts,
 )
 from frf_ipz.quantities import RESPONSES
 
@@ -36,6 +36,7 @@ OPPOSITE = "its sign is the opposite"
 UNNAMED = ""
 ADVICE = "which is right does not show in two: drop the wrong one by [ingest] drop, or record a third"
 DISAGREE = 0.12  # of the FRF, 1 dB: two impacts that differ by more are no repetition; what is explained to this, is
+LITTLE = 0.5  # of the usual weight: less is said
 FEWEST_LINES = 64  # that are compared, however many impacts there are: a band of the scatter's fit
 
 
@@ -77,27 +78,35 @@ def _transform(files: RecordingFiles, survey: Survey, records: Sequence[RecordIn
     stride = max(min(len(records), survey.n_samples // 2 // FEWEST_LINES), 1)
     lines = slice(None, None, stride)
     frequency_hz = np.asarray(np.fft.rfftfreq(survey.n_samples, survey.step_s)[lines])
-    forces, responses, noises = [], [], []
+    forces, responses, noises, force_noises = [], [], [], []
     for record, signals in _windowed(files, survey, records):
         transforms = np.fft.rfft(signals)[:, lines].copy()  # without what is not compared
         forces.append(transforms[0])
         responses.append(transforms[1:])
-        window = window_impact(
+        force_window, window = window_impact(
             np.ones((2, record.n_samples)),
             survey.n_samples,
             record.force_interval,
             survey.decay_1_s * record.step_s,
             record.trigger,
-        )[1]
+        )
         unwindowed = signals[1:] / np.maximum(window, np.finfo(float).tiny)
         noise = [
             noise_power(response[record.trigger : record.n_samples], record.step_s, frequency_hz)
             for response in unwindowed
         ]
-        noises.append(np.nan_to_num(np.array(noise)) * np.sum(window**2))
+        spikes = [[record.spike_power(output, window)] for output in range(len(noise))]
+        noises.append(np.nan_to_num(np.array(noise)) * np.sum(window**2) + np.array(spikes))
+        force_noises.append(record.force_noise**2 * np.sum(force_window**2))
     outputs = range(len(records[0].setup.output_dofs))
     valid = np.array([[output in record.used_outputs for output in outputs] for record in records])
-    return ImpactSpectra(force=np.array(forces), responses=np.array(responses), noise=np.array(noises), valid=valid)
+    return ImpactSpectra(
+        force=np.array(forces),
+        responses=np.array(responses),
+        noise=np.array(noises),
+        force_noise=np.array(force_noises),
+        valid=valid,
+    )
 
 
 def _windowed(
@@ -107,7 +116,7 @@ def _windowed(
         in_file = list(group)
         segments = files.segments(in_file[0].setup, path, [(record.start, record.stop) for record in in_file])
         for record, segment in zip(in_file, segments, strict=True):
-            signals = segment[1:] - np.array(record.offsets)[:, None]
+            signals = record.correct(segment[1:])
             decay = survey.decay_1_s * record.step_s
             yield record, window_impact(signals, survey.n_samples, record.force_interval, decay, record.trigger)
 
@@ -128,18 +137,52 @@ def _compare_setup(
                 if not explained:
                     unlike.add((impact, output))
                 named[output] = f"{CONTRADICTS}: {explained or _difference(spectra, comparison, (impact, output))}"
-    scales = np.ones((len(records), len(columns)))
-    for output, comparison in enumerate(comparisons):
-        if comparison is not None:
-            scales[:, output] = noise_scales(spectra, comparison, output)
+    agree = [() if comparison is None else comparison.agreeing for comparison in comparisons]
     return [
         replace(
             _with_causes(record, causes[impact], columns),
-            noise_scales=tuple(float(scale) for scale in scales[impact]),
             is_unlike=all((impact, output) in unlike for output in record.used_outputs),
+        )
+        for impact, record in enumerate(_weighed(files, survey, records, spectra, agree))
+    ]
+
+
+def _weighed(
+    files: RecordingFiles,
+    survey: Survey,
+    records: Sequence[RecordInfo],
+    spectra: ImpactSpectra,
+    agreeing: Sequence[Sequence[int]],
+) -> list[RecordInfo]:
+    """Add the weights of impacts, of which some agree in each response."""
+    n_lines = spectra.force.shape[1]
+    points = np.linspace(0, n_lines - 1, 2 * max(n_lines // FEWEST_LINES, 1) + 1)
+    n_shown = survey.n_samples / 4 / n_lines  # half a record has a line for every second one of the whole
+    weights, scales = zip(
+        *(weigh_impacts(spectra, impacts, output, n_shown) for output, impacts in enumerate(agreeing)), strict=True
+    )
+    return [
+        replace(
+            record,
+            noise_weights=tuple(tuple(np.interp(points, np.arange(n_lines), row[impact]).tolist()) for row in weights),
+            noise_scales=tuple(float(scale[impact]) for scale in scales),
+            remarks=(*record.remarks, *_find_noisy(files, [row[impact] for row in weights])),
         )
         for impact, record in enumerate(records)
     ]
+
+
+def _find_noisy(files: RecordingFiles, weights: Sequence[FloatArray]) -> tuple[str, ...]:
+    """Say which responses of an impact count little for their noise."""
+    shares = [
+        (channel.column, float(np.median(row)))
+        for channel, row in zip(files.test.output_channels, weights, strict=True)
+    ]
+    return tuple(
+        f"{column} is noisier than in the other impacts: it counts {100 * share:.2g} % of a usual one"
+        for column, share in shares
+        if share < LITTLE
+    )
 
 
 def _compare_output(
@@ -324,7 +367,8 @@ def _compare_pair(
     listed = ", ".join(f"{column} {100 * part:.0f} %" for column, part in differences.items() if part > DISAGREE)
     names = " and ".join(record.name for record in records)
     text = f"{names} contradict each other: their FRFs differ by {listed} (rms); {ADVICE}"
-    return [], [text] if listed else []
+    agree = [tuple(np.flatnonzero(spectra.valid[:, output]).tolist()) for output in range(len(columns))]
+    return _weighed(files, survey, records, spectra, agree), [text] if listed else []
 
 
 def _lost_of_pair(

@@ -15,15 +15,22 @@ densities of D with and without must exceed the number of explanations over the 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.ingest.signals.scatter import ROUNDING, fit_noise_power
+from frf_ipz.ingest.survey.noise_weights import noise_weights
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 CUT_OFF = 1e-3  # of a mode's amplitude at the end of a record that is worth no window
 LEVEL = 1e-3  # probability that a test without faults loses anything
 FEWEST = 3  # impacts of which one can be told from the majority
+FEWEST_WEIGHED = 2  # impacts whose noise can be compared
+PASSES = 3  # of the weights
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,6 +45,8 @@ class ImpactSpectra:
         SI.
     noise : (n_impacts, n_outputs, n_lines) array
         Noise power of the responses as each impact shows it.
+    force_noise : (n_impacts,) array
+        That of the force.
     valid : (n_impacts, n_outputs) bool array
         Which responses are measurements at all.
     """
@@ -45,6 +54,7 @@ class ImpactSpectra:
     force: ComplexArray
     responses: ComplexArray
     noise: FloatArray
+    force_noise: FloatArray
     valid: np.ndarray
 
 
@@ -236,41 +246,71 @@ def follows_force(spectra: ImpactSpectra, output: int) -> bool:
     return bool(is_mean_high or np.max(statistic) > np.log(len(statistic) / LEVEL))
 
 
-def noise_scales(spectra: ImpactSpectra, comparison: OutputComparison, output: int) -> FloatArray:
-    """Estimate the noise power of each impact over the scatter of all.
+def weigh_impacts(
+    spectra: ImpactSpectra, agreeing: Sequence[int], output: int, n_shown: float
+) -> tuple[FloatArray, FloatArray]:
+    """Weigh impacts that agree by their noise, and estimate the noise power that remains under the weights.
 
-    What H1 leaves of impact k, whose share of the force's power is h_k, has the expectation
-    ``v (s_k (1 - 2 h_k) + h_k sum h_m s_m)``, which is linear in the relative powers s.
+    The weights are found twice: a loud impact hides in the first scatter what the others have.
 
     Parameters
     ----------
     spectra : ImpactSpectra
         All impacts.
-    comparison : OutputComparison
-        Which of them agree.
+    agreeing : sequence of int
+        Those that agree in this response.
     output : int
         Which response.
+    n_shown : float
+        Lines of the spectra that show the noise, for each line here.
 
     Returns
     -------
-    (n_impacts,) array
-        s, not negative; 1 for those that do not agree.
+    weights : (n_impacts, n_lines) array
+        Their mean over the impacts that agree is 1; 1 for the others.
+    scales : (n_impacts,) array
+        Noise power of each under its weight, over the scatter; 1 for those that do not agree.
     """
-    scales = np.ones(len(spectra.force))
-    impacts = list(comparison.agreeing)
-    if len(impacts) < FEWEST:
-        return scales
+    weights, scales = np.ones(spectra.force.shape), np.ones(len(spectra.force))
+    impacts = list(agreeing)
+    if len(impacts) < FEWEST_WEIGHED:
+        return weights, scales
     force, response = spectra.force[impacts], spectra.responses[impacts, output]
+    for _ in range(PASSES):
+        root = np.sqrt(weights[impacts])
+        reference = _agreement(root * force, root * response, impacts)
+        scatter = np.maximum(reference.scatter, np.finfo(float).tiny)
+        own = spectra.noise[impacts, output] + spectra.force_noise[impacts, None] * np.abs(reference.frf) ** 2
+        scaled = root / np.sqrt(scatter)
+        weights[impacts] *= noise_weights(scaled * force, scaled * response, own * weights[impacts] / scatter, n_shown)
+        weights[impacts] /= weights[impacts].mean(axis=0)
+    root = np.sqrt(weights[impacts])
+    scales[impacts] = _noise_scales(root * force, root * response)
+    return weights, scales
+
+
+def _noise_scales(force: ComplexArray, response: ComplexArray) -> FloatArray:
+    """Estimate the noise power of each impact over the scatter of all, not negative.
+
+    What H1 leaves of impact k, whose share of the force's power is h_k, has the expectation
+    ``v (s_k (1 - 2 h_k) + h_k sum h_m s_m)``, which is linear in the relative powers s. It is known to one over
+    the root of the lines, and s is 1 within a deviation of 1 beforehand: of two impacts beside a loud one it tells
+    no more than their mean.
+    """
+    ones = np.ones(len(force))
     power = np.abs(force) ** 2
     total = power.sum(axis=0)
-    usable = (comparison.scatter > 0.0) & (total > 0.0)
-    if not usable.any():
-        return scales
+    reference = _agreement(force, response, [])
+    usable = (reference.scatter > 0.0) & (total > 0.0)
+    if len(force) < FEWEST or not usable.any():
+        return ones
     shares = power[:, usable] / total[usable]
-    left = np.abs(response - comparison.frf * force)[:, usable] ** 2 / comparison.scatter[usable]
+    left = np.abs(response - reference.frf * force)[:, usable] ** 2 / reference.scatter[usable]
     matrix = np.diag(1.0 - 2.0 * shares.mean(axis=1)) + shares @ shares.T / shares.shape[1]
-    scales[impacts] = np.maximum(np.linalg.lstsq(matrix, left.mean(axis=1), rcond=None)[0], 0.0)
-    return scales if scales[impacts].any() else np.ones(len(spectra.force))
+    beyond = left.mean(axis=1) - matrix.sum(axis=1)
+    normal = matrix.T @ matrix + np.eye(len(force)) / shares.shape[1]
+    scales = np.maximum(1.0 + np.linalg.solve(normal, matrix.T @ beyond), 0.0)
+    return np.asarray(scales) if scales.any() else ones
 
 
 def contradicts_pairwise(spectra: ImpactSpectra, output: int) -> bool:

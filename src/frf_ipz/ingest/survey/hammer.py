@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.survey.record_info import RecordInfo
     from frf_ipz.progress import Progress
 
+UNSEEN = 1 / 3  # of the noise: adds a twentieth to its deviation
 REMAINDER = 3e-4  # share of the slowest mode that remains under an automatic window: below the noise of good records
 SAME_LENGTH = 0.01  # relative difference up to which recordings are taken as equally long
 LONG_BEFORE = 0.12  # of a recording before its impact: more is cut off, for it holds nothing but noise
@@ -63,11 +65,10 @@ def survey_hammer(files: RecordingFiles, options: IngestOptions, progress: Progr
     survey = _plan(indices, records, options)
     compared_records, pairwise = compare_impacts(files, survey)
     if any(after.marks != before.marks for after, before in zip(compared_records, survey.records, strict=True)):
-        scales = {record.name: record.noise_scales for record in compared_records}
         compared = {record.name: record for record in compared_records}
         marked_records = [_with_contradictions(record, compared[record.name]) for record in records]
         survey = _plan(indices, marked_records, options)
-        compared_records = tuple(replace(record, noise_scales=scales[record.name]) for record in survey.records)
+        compared_records = tuple(_with_noise(record, compared[record.name]) for record in survey.records)
     return replace(survey, records=compared_records, warnings=(*survey.warnings, *pairwise))
 
 
@@ -79,6 +80,16 @@ def _with_contradictions(record: RecordInfo, compared: RecordInfo) -> RecordInfo
         faults=(*record.faults, *faults),
         channel_faults=compared.channel_faults,
         is_unlike=compared.is_unlike,
+    )
+
+
+def _with_noise(record: RecordInfo, compared: RecordInfo) -> RecordInfo:
+    """Add the noise that the comparison with the other impacts has found."""
+    return replace(
+        record,
+        noise_weights=compared.noise_weights,
+        noise_scales=compared.noise_scales,
+        remarks=tuple(dict.fromkeys((*record.remarks, *compared.remarks))),
     )
 
 
@@ -144,6 +155,7 @@ def _without_long_lead(record: RecordInfo) -> RecordInfo:
         start=record.start + cut,
         trigger=record.trigger - cut,
         pulse_interval=(start - cut, stop - cut),
+        spikes=tuple(replace(spike, start=spike.start - cut) for spike in record.spikes),
         force_interval=(0, record.n_samples - cut),
     )
 
@@ -184,7 +196,7 @@ def _choose_decay(used: Sequence[RecordInfo], options: IngestOptions) -> tuple[f
         if record.remaining_amplitude > CUT_OFF
     ]
     if not rates:
-        return 0.0, ()
+        return _decay_by_noise(used)
     rate, slowest = max(rates, key=lambda pair: float(pair[0]))
     text = (
         f"exponential window of {1.0 / rate:.4g} s on force and response: without it "
@@ -192,6 +204,22 @@ def _choose_decay(used: Sequence[RecordInfo], options: IngestOptions) -> tuple[f
         f"at the end of {slowest.name}, with it {100 * REMAINDER:.2g} %; the FRFs are exact at s = sigma + i omega"
     )
     return float(rate), (text,)
+
+
+def _decay_by_noise(used: Sequence[RecordInfo]) -> tuple[float, tuple[str, ...]]:
+    """Choose the rate of the window where decays are cut off by little, but by more than the noise of their mean."""
+    counts = Counter(record.setup for record in used)
+    ratios = [record.cut_off_ratio * counts[record.setup] ** 0.5 for record in used]
+    if max(ratios) <= 1.0:
+        return 0.0, ()
+    rates = [np.log(max(ratio / UNSEEN, 1.0)) / record.ringing_s for ratio, record in zip(ratios, used, strict=True)]
+    worst = int(np.argmax(rates))
+    text = (
+        f"exponential window of {1.0 / rates[worst]:.4g} s on force and response: without it what is cut off of the "
+        f"mode at {used[worst].cut_off_hz:.4g} Hz at the end of {used[worst].name} would be {ratios[worst]:.2g} times "
+        "the noise of the mean; the FRFs are exact at s = sigma + i omega"
+    )
+    return float(rates[worst]), (text,)
 
 
 def _choose_force_window(

@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from frf_ipz.arrays import FloatArray
 from frf_ipz.ingest.campaign import TestSetup
+from frf_ipz.ingest.signals.spikes import Spike
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +52,9 @@ class RecordInfo:
         Share of its amplitude that the slowest mode still has at the end.
     slowest_mode_hz : float
         That mode's frequency, Hz.
+    cut_off_ratio, cut_off_amplitude, cut_off_hz : float
+        What the end of the record cuts off of a mode, over the deviation of its noise; the share of its amplitude that
+        this mode still has there, and its frequency, Hz.
     snr_db : float
         Power of the response over its noise, median of the channels, dB; NaN where the noise is not known.
     starts_at_rest : bool
@@ -68,8 +75,13 @@ class RecordInfo:
         Samples of the force that its record lacks because it begins within the pulse, N.
     lacks_most : bool
         Its record begins so late in the pulse that nothing is known of the force.
+    noise_weights : tuple of tuples of float
+        For each response, the weight of this impact on points from 0 Hz to half of the sampling rate, equally spaced;
+        the mean over the impacts is 1. Empty where they cannot be compared.
     noise_scales : tuple of float
-        Noise power of each response over that of the other impacts; empty where they cannot be compared.
+        Noise power of each response over that of the other impacts, under these weights; empty as they are.
+    spikes : tuple of Spike
+        Jumps in its responses that no band-limited motion makes, from `start`; they are taken off.
     period : int
         Samples after which the force of a shaker comes again; 0 where it does not.
     is_unlike : bool
@@ -94,6 +106,9 @@ class RecordInfo:
     second_pulse_ratio: float = 0.0
     remaining_amplitude: float = 0.0
     slowest_mode_hz: float = 0.0
+    cut_off_ratio: float = 0.0
+    cut_off_amplitude: float = 0.0
+    cut_off_hz: float = 0.0
     snr_db: float = float("nan")
     starts_at_rest: bool = True
     number: int = 1
@@ -104,7 +119,9 @@ class RecordInfo:
     keeps_channels: bool = False
     missing_force: tuple[float, ...] = (0.0,)
     lacks_most: bool = False
+    noise_weights: tuple[tuple[float, ...], ...] = ()
     noise_scales: tuple[float, ...] = ()
+    spikes: tuple[Spike, ...] = ()
     period: int = 0
     is_unlike: bool = False
 
@@ -112,6 +129,43 @@ class RecordInfo:
     def n_samples(self) -> int:
         """Number of samples."""
         return self.stop - self.start
+
+    def spike_power(self, output: int, window: FloatArray) -> float:
+        """Give the mean squared modulus of what the errors of the spikes of a response add to its transform.
+
+        Parameters
+        ----------
+        output : int
+            Which response, by its place in the set-up.
+        window : (n_samples,) array
+            What the response is multiplied by.
+
+        Returns
+        -------
+        float
+            0 where it has none.
+        """
+        inside = [spike for spike in self.spikes if spike.output == output and spike.start < len(window)]
+        return float(sum(spike.error * window[spike.start] ** 2 for spike in inside))
+
+    def correct(self, signals: FloatArray) -> FloatArray:
+        """Take offsets and spikes off.
+
+        Parameters
+        ----------
+        signals : (1 + n_outputs, n_samples) array
+            Force and responses as recorded, SI.
+
+        Returns
+        -------
+        (1 + n_outputs, n_samples) array
+            Corrected.
+        """
+        corrected = signals - np.array(self.offsets)[:, None]
+        for spike in self.spikes:
+            part = corrected[1 + spike.output, spike.start : spike.start + len(spike.values)]
+            part -= spike.values[: len(part)]
+        return np.asarray(corrected)
 
     @property
     def ringing_s(self) -> float:
