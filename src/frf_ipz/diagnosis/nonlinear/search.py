@@ -111,6 +111,8 @@ class LawSearch:
         That it was fitted with; `simulate` needs it.
     location : Location
         Where a force of unknown law acts, as in `diagnosis.json`; empty where that was not searched or not found.
+    unknown_force : SimpleLawsFit, optional
+        The best force of unknown law, where no law explains.
     dispersion_rad : float
         Dispersion of the converters that was removed before the law was fitted, see `remove_dispersion`; rad.
     is_early : bool
@@ -131,6 +133,7 @@ class LawSearch:
     fit: LawFit | None = None
     nuisance_prior: NuisancePrior | None = None
     location: Location = field(default_factory=Location)
+    unknown_force: SimpleLawsFit | None = None
     dispersion_rad: float = 0.0
     is_early: bool = False
     law_in_time: LawInTime | None = None
@@ -213,8 +216,8 @@ def search_laws(
     if state.result.verdict == DiagnosisVerdict.UNEXPLAINED:
         progress(0.4, "locating a force of unknown law")
         located = _locate_unknown_force(state)
-    is_complete = located is not None and located.mean_misfit < 1  # nothing is left that a dispersion would explain
-    if state.result.fit is not None and not is_complete and not (located is None and is_explained(state.result.fit)):
+    fit = state.result.fit
+    if fit is not None and not (is_explained(fit) if located is None else located.explains_all):
         progress(0.6, "checking for a dispersion of the converters")
         corrected = _search_without_dispersion(state, linearity, laws)
         if corrected is not state and corrected.result.verdict == DiagnosisVerdict.UNEXPLAINED:
@@ -223,7 +226,7 @@ def search_laws(
     result = state.result
     if located is not None and result.verdict == DiagnosisVerdict.UNEXPLAINED:
         part = LARGELY if _free_force_explains(state.long, located.location) else MOSTLY
-        result = _with_location(result, modal_model, located, part)
+        result = replace(_with_location(result, modal_model, located, part), unknown_force=located)
     if result.fit is None:
         return result
     progress(0.9, "checking the prediction of held-out records")
@@ -300,7 +303,9 @@ def _locate_unknown_force(state: _SearchState) -> SimpleLawsFit:
         fit for fit in fits if fit.cost < NEAR_BEST * fits[0].cost and fit.location in long.localisation.equivalent
     ][:MAX_NEAR_BEST]
     small = [fit for fit in near_best if gain_of_others(fit) < SMALL_GAIN * fit.cost]
-    beside_law = [SimpleLawsFit.of_problem(long, fit.location, fit.cost - gain_of_others(fit)) for fit in small]
+    beside_law = [
+        SimpleLawsFit.of_problem(long, fit.location, fit.cost - gain_of_others(fit), fit.nuisance) for fit in small
+    ]
     of_each_law = {fit.law.name: fit.location for fit in reversed(fits)}
     alone, by_first_moments = locate_unknown_law(short, long, of_each_law.values())
     best = min(

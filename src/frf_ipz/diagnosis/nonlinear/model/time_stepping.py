@@ -29,7 +29,7 @@ SMALLEST = 1e-300
 SLOW = 1.0  # rad that a mode turns in a step: up to there its samples distinguish it from its aliases
 BLOCK_STEPS = 32  # that are taken at once: a longer triangle costs more than the calls that it saves
 HALF = 0.5  # of an error: rounds that leave more are too many
-PRECISION = 1e-10  # of the largest force so far: what a round may leave, next to which rounding of all steps shows
+PRECISION = 1e-12  # of the largest force so far: what a round may leave, next to which rounding of all steps shows
 HOLD_LEAD = 0.6  # part of a step: at 1/2 a held force is neither early nor late, above it does not ring while it sticks
 
 
@@ -282,7 +282,7 @@ def step_in_time(
     differences = _difference_step(motion), _difference_step(velocity)
     state = np.zeros((len(motion), 2 * len(compliance.weights)))  # by the law's force in all earlier steps
     force, free_motion, free_velocity = (np.zeros(motion.shape) for _ in range(3))
-    largest = SMALLEST
+    held, largest = np.zeros(len(motion)), SMALLEST
     for times, block in _split_into_blocks(compliance, motion.shape[1]):
         by_motion, by_velocity = block.move_freely(state)
         law_block = _LawBlock(
@@ -293,9 +293,9 @@ def step_in_time(
             velocity=velocity[:, times] + by_velocity,
             differences=differences,
         )
-        force[:, times] = law_block.solve(largest)
+        force[:, times] = law_block.solve(held, largest)
         free_motion[:, times], free_velocity[:, times] = law_block.free_motion(force[:, times])
-        largest = max(largest, float(np.abs(force[:, times]).max()))
+        held, largest = force[:, times.stop - 1], max(largest, float(np.abs(force[:, times]).max()))
         state = block.advance(state, force[:, times])
     return TimeHistory(
         force=force,
@@ -333,15 +333,16 @@ class _LawBlock:
         by_motion, by_velocity = self.block.by_force
         return self.motion - force @ by_motion.T, self.velocity - force @ by_velocity.T
 
-    def solve(self, largest: float) -> FloatArray:
-        """Find the forces by Newton's method, as long as each round halves the error; what it leaves step by step.
+    def solve(self, held: FloatArray, largest: float) -> FloatArray:
+        """Find the forces by Newton's method from a force that is held, (n_segments,), as long as each round halves the error; what it leaves step by step.
 
         Each round makes at least one more step exact, and all where the law has no kink there; where friction switches
         every few steps, rounds are of little use.
         """
         if not np.isfinite(self.motion).all():  # a motion that has diverged
             return np.full(self.motion.shape, np.nan)
-        force, before = self.law.solve(self.motion, self.velocity, self.step), np.inf
+        w, v = self.free_motion(np.repeat(held[:, None], self.block.n_steps, axis=1))
+        force, before = self.law.solve(w, v, self.step), np.inf
         while True:
             w, v = self.free_motion(force)
             by_law = self.law.solve(w, v, self.step)
