@@ -30,9 +30,7 @@ STD_INFLATION = 2.0  # of the fit's standard deviations: neighbouring lines shar
 MIN_STDS = 3.0  # from zero: laws that were there had 9 and more, two that explained without being there had 2
 
 
-def log_evidence_gains(
-    fits: Sequence[LawFit], drops: FloatArray, n_locations: int, scale: float
-) -> FloatArray:
+def log_evidence_gains(fits: Sequence[LawFit], drops: FloatArray, n_locations: int, scale: float) -> FloatArray:
     """Subtract the Occam factors of laws from the drops of the cost.
 
     A fit that no Occam factor can bring before the best of its law is left without one: its probability is zero, and
@@ -58,7 +56,9 @@ def log_evidence_gains(
     for fit, drop in zip(fits, drops, strict=True):
         best[fit.law.name] = max(best[fit.law.name], float(drop))
     behind = np.array([best[fit.law.name] for fit in fits]) - drops
-    factors = [_log_occam_factor(fit, scale) if late < FAR_BEHIND else 0.0 for fit, late in zip(fits, behind, strict=True)]
+    factors = [
+        _log_occam_factor(fit, scale) if late < FAR_BEHIND else 0.0 for fit, late in zip(fits, behind, strict=True)
+    ]
     return np.asarray(drops - np.log(n_locations) + np.array(factors))
 
 

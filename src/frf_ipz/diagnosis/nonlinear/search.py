@@ -361,7 +361,7 @@ def _judge(
     *,
     always_rescores: bool = False,
 ) -> LawSearch:
-    """Judge the best of fits; those that explain equally well are rescored where one of them may explain the records."""
+    """Judge the best of fits; those that explain equally well are rescored where one of them may explain all."""
     if not fits:
         return LawSearch(
             verdict=DiagnosisVerdict.UNEXPLAINED,

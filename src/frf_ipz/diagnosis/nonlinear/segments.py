@@ -7,7 +7,7 @@ state at its start, which is unknown (`SegmentSet.moving`).
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -114,11 +114,7 @@ class SegmentSet:
     @property
     def steps_per_sample(self) -> int:
         """Time steps of a simulation per sample of the recordings."""
-        return self.fine_force.shape[1] // self.n_samples
-
-    def with_steps(self, steps_per_sample: int) -> SegmentSet:
-        """Simulate with longer time steps: a divisor of the present number per sample."""
-        return replace(self, fine_force=self.fine_force[:, :: self.steps_per_sample // steps_per_sample])
+        return int(self.fine_force.shape[1] // self.n_samples)
 
     @property
     def sigma_1_s(self) -> float:

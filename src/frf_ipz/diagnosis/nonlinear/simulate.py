@@ -92,8 +92,8 @@ def simulate(
         measured=measured,
         simulated=responses * is_present,
         without=_sensor_responses(time_response, np.zeros_like(history.force)) * is_present,
-        motion=history.motion[:, ::segments.steps_per_sample],
-        force=history.force[:, ::segments.steps_per_sample],
+        motion=history.motion[:, :: segments.steps_per_sample],
+        force=history.force[:, :: segments.steps_per_sample],
         misfit=_relative_misfit(measured, responses, segments.step_s, observations),
     )
 
@@ -167,13 +167,13 @@ def _sensor_responses(time_response: TimeResponse, law_force: FloatArray) -> Flo
     at_inputs = (modal_model.at_sensors.weights @ modal_model.at_inputs.static)[:, segments.input_of]
     at_location = modal_model.at_sensors.weights @ modal_model.at_locations.static[:, time_response.location]
     static = at_inputs.T[..., None] * segments.fine_force[:, None] - at_location[:, None] * law_force[:, None]
-    responses = np.zeros(static[..., ::segments.steps_per_sample].shape)
+    responses = np.zeros(static[..., :: segments.steps_per_sample].shape)
     for row, sensor in enumerate(modal_model.sensors):
         residual = static[:, row]
         for _ in range(sensor.quantity.power):
             residual = np.gradient(residual, time_response.step_s, axis=-1)
         modal_sum = np.einsum("m,bmt->bt", shapes[row], modal[sensor.quantity.power])
-        responses[:, row] = (modal_sum + residual)[:, ::segments.steps_per_sample]
+        responses[:, row] = (modal_sum + residual)[:, :: segments.steps_per_sample]
     return responses
 
 

@@ -43,7 +43,8 @@ def fit_at(problem, node):
         nuisance=problem.linear.start_nuisance,
     )
     return problem.fit_output_error(
-        SimpleNamespace(start=lambda _: start, nuisance=start.nuisance, n_rows=problem.linear.n_rows, simulation=None), 12
+        SimpleNamespace(start=lambda _: start, nuisance=start.nuisance, n_rows=problem.linear.n_rows, simulation=None),
+        12,
     )
 
 

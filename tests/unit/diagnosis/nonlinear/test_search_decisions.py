@@ -207,7 +207,9 @@ def test_no_dispersion_is_searched_where_a_force_of_unknown_law_leaves_nothing(m
     assert bool(searched) == is_searched
 
 
-@pytest.mark.parametrize(("objection", "always", "n_rescored"), [("", False, 2), ("wrong", False, 0), ("wrong", True, 2)])
+@pytest.mark.parametrize(
+    ("objection", "always", "n_rescored"), [("", False, 2), ("wrong", False, 0), ("wrong", True, 2)]
+)
 def test_fits_are_rescored_where_one_of_them_may_explain(monkeypatch, objection, always, n_rescored):
     """Two laws explain equally well; another is far behind."""
     rescored = []

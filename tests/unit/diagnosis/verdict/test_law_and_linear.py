@@ -36,9 +36,7 @@ def nominal(tmp_path_factory):
 
 
 def a_law(verdict, nuisance_chi2=0.0, unknown_force=None):
-    return SimpleNamespace(
-        verdict=verdict, nuisance_chi2=nuisance_chi2, fit=object(), unknown_force=unknown_force
-    )
+    return SimpleNamespace(verdict=verdict, nuisance_chi2=nuisance_chi2, fit=object(), unknown_force=unknown_force)
 
 
 class Laws:
@@ -91,8 +89,12 @@ def test_an_effect_that_relieves_a_strained_model_is_named_beside_a_law_that_doe
         assert pair[1].effect == "added_mass"
 
 
-@pytest.mark.parametrize(("misfit", "nuisance_chi2", "is_searched"), [(0.5, 2.0, False), (0.5, 30.0, True), (2.0, 2.0, True)])
-def test_nothing_is_searched_beside_a_force_of_unknown_law_that_leaves_nothing(nominal, misfit, nuisance_chi2, is_searched):
+@pytest.mark.parametrize(
+    ("misfit", "nuisance_chi2", "is_searched"), [(0.5, 2.0, False), (0.5, 30.0, True), (2.0, 2.0, True)]
+)
+def test_nothing_is_searched_beside_a_force_of_unknown_law_that_leaves_nothing(
+    nominal, misfit, nuisance_chi2, is_searched
+):
     frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
     force = SimpleLawsFit(
         location=3, cost=misfit, mean_misfit=misfit, linear_mean_misfit=50.0, nuisance_chi2=nuisance_chi2

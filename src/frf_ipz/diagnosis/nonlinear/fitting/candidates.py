@@ -216,9 +216,7 @@ def _simulate(
     """Fit by simulation; those whose cost after a few steps is too far above the least, only so far."""
     simulated = [problem.fit_output_error(fit, FIRST_STEPS) for fit in fits]
     least = min(least, *(fit.cost for fit in simulated)) if simulated else least
-    return [
-        _continue_promising(problem, fit, is_promising=fit.cost <= max_ratio * least) for fit in simulated
-    ]
+    return [_continue_promising(problem, fit, is_promising=fit.cost <= max_ratio * least) for fit in simulated]
 
 
 def _continue_promising(problem: LawFitProblem, fit: LawFit, *, is_promising: bool) -> LawFit:

@@ -5,6 +5,10 @@ over the damped frequency is the displacement. A step sums samples of the exact 
 sum is a constant to the fourth order, h^2/12 of the force, which is subtracted (for a free mass that is the method of
 Numerov, 1924). Modes that turn too far in a step take forces that are linear in time.
 At the end of each step the law is solved for the force that fits the motion that it itself changes.
+
+Many steps are taken at once. A force moves its location at later steps only, so that its feedback within a block of
+steps is a triangular matrix, the sampled impulse response; a law is solved in a block by Newton's method, and its
+derivatives by all parameters together are one triangular system. The results are those of steps one by one.
 """
 
 from __future__ import annotations
@@ -334,10 +338,10 @@ class _LawBlock:
         return self.motion - force @ by_motion.T, self.velocity - force @ by_velocity.T
 
     def solve(self, held: FloatArray, largest: float) -> FloatArray:
-        """Find the forces by Newton's method from a force that is held, (n_segments,), as long as each round halves the error; what it leaves step by step.
+        """Find the forces by Newton's method, as long as each round halves the error; what it leaves step by step.
 
         Each round makes at least one more step exact, and all where the law has no kink there; where friction switches
-        every few steps, rounds are of little use.
+        every few steps, rounds are of little use. They start from a force that is held, (n_segments,).
         """
         if not np.isfinite(self.motion).all():  # a motion that has diverged
             return np.full(self.motion.shape, np.nan)
