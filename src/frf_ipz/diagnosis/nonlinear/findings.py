@@ -17,39 +17,57 @@ from frf_ipz.diagnosis.result import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawFit
     from frf_ipz.diagnosis.nonlinear.model.modal_model import ModalModel
 
 LOG_RANGE = np.log(1e6)  # of a law's parameters: uniform over six decades each
+LEAST_SPREAD = 1e-12  # of the logarithm of a parameter
+FAR_BEHIND = 2 * float(np.log(LOG_RANGE / LEAST_SPREAD))  # log evidence: more than the Occam factor of two parameters
 STD_INFLATION = 2.0  # of the fit's standard deviations: neighbouring lines share the model's errors
 MIN_STDS = 3.0  # from zero: laws that were there had 9 and more, two that explained without being there had 2
 
 
-def log_evidence_gain(fit: LawFit, drop: float, n_locations: int, scale: float) -> float:
-    """Subtract the Occam factor of a law from the drop of the cost.
+def log_evidence_gains(fits: Sequence[LawFit], drops: FloatArray, n_locations: int, scale: float) -> FloatArray:
+    """Subtract the Occam factors of laws from the drops of the cost.
+
+    A fit that no Occam factor can bring before the best of its law is left without one: its probability is zero, and
+    no covariance is needed.
 
     Parameters
     ----------
-    fit : LawFit
-        A law at its location.
-    drop : float
-        Half the drop of the cost against the linear model.
+    fits : sequence of LawFit
+        Laws at their locations.
+    drops : (n_fits,) array
+        Half the drop of the cost against the linear model, over the expected mean square of the misfit.
     n_locations : int
-        At which it might act.
+        At which a law might act.
     scale : float
         Expected mean square of the misfit.
 
     Returns
     -------
-    float
-        Log evidence over that of the linear model.
+    (n_fits,) array
+        Log evidence of each over that of the linear model.
     """
-    gain = drop - np.log(n_locations)
+    best = {fit.law.name: -np.inf for fit in fits}
+    for fit, drop in zip(fits, drops, strict=True):
+        best[fit.law.name] = max(best[fit.law.name], float(drop))
+    behind = np.array([best[fit.law.name] for fit in fits]) - drops
+    factors = [
+        _log_occam_factor(fit, scale) if late < FAR_BEHIND else 0.0 for fit, late in zip(fits, behind, strict=True)
+    ]
+    return np.asarray(drops - np.log(n_locations) + np.array(factors))
+
+
+def _log_occam_factor(fit: LawFit, scale: float) -> float:
+    factor = 0.0
     for value, variance in fit.numbers.values():
         spread = min(np.sqrt(max(variance, 1e-300) * scale) / max(abs(value), 1e-300), LOG_RANGE)
-        gain += np.log(np.sqrt(2 * np.pi) * max(spread, 1e-12) / LOG_RANGE)
-    return float(gain)
+        factor += float(np.log(np.sqrt(2 * np.pi) * max(spread, LEAST_SPREAD) / LOG_RANGE))
+    return factor
 
 
 def make_findings(

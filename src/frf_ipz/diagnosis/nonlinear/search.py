@@ -22,12 +22,12 @@ from frf_ipz.diagnosis.deadline import NO_LIMIT, Deadline
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.measured.preprocessing.dispersion import excess_delay_s
 from frf_ipz.diagnosis.nonlinear.channel_noise import read_noise
-from frf_ipz.diagnosis.nonlinear.findings import is_determined, log_evidence_gain, make_findings
+from frf_ipz.diagnosis.nonlinear.findings import is_determined, log_evidence_gains, make_findings
 from frf_ipz.diagnosis.nonlinear.fitting.candidates import FRESH_STEPS, find_candidates, is_explained
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import INDISTINGUISHABLE
 from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import gain_of_added_forces
 from frf_ipz.diagnosis.nonlinear.fitting.problem import FINE, ROUGH, WEAK, LawFitData
-from frf_ipz.diagnosis.nonlinear.fitting.rescoring import rescore
+from frf_ipz.diagnosis.nonlinear.fitting.rescoring import rescore, select_contenders
 from frf_ipz.diagnosis.nonlinear.fitting.simple_laws import (
     MANY_ROUNDS,
     SimpleLawsFit,
@@ -111,6 +111,8 @@ class LawSearch:
         That it was fitted with; `simulate` needs it.
     location : Location
         Where a force of unknown law acts, as in `diagnosis.json`; empty where that was not searched or not found.
+    unknown_force : SimpleLawsFit, optional
+        The best force of unknown law, where no law explains.
     dispersion_rad : float
         Dispersion of the converters that was removed before the law was fitted, see `remove_dispersion`; rad.
     is_early : bool
@@ -131,6 +133,7 @@ class LawSearch:
     fit: LawFit | None = None
     nuisance_prior: NuisancePrior | None = None
     location: Location = field(default_factory=Location)
+    unknown_force: SimpleLawsFit | None = None
     dispersion_rad: float = 0.0
     is_early: bool = False
     law_in_time: LawInTime | None = None
@@ -209,17 +212,21 @@ def search_laws(
         training=training, held_out=held_out, modal_model=modal_model, noise=noise, options=options, deadline=deadline
     )
     state = _search_catalogue(data, linearity, laws)
-    if state.result.fit is not None and (
-        state.result.verdict == DiagnosisVerdict.UNEXPLAINED or not is_explained(state.result.fit)
-    ):
-        progress(0.4, "checking for a dispersion of the converters")
-        state = _search_without_dispersion(state, linearity, laws)
-    result = state.result
-    if result.verdict == DiagnosisVerdict.UNEXPLAINED:
-        progress(0.6, "locating a force of unknown law")
+    located = None
+    if state.result.verdict == DiagnosisVerdict.UNEXPLAINED:
+        progress(0.4, "locating a force of unknown law")
         located = _locate_unknown_force(state)
+    fit = state.result.fit
+    if fit is not None and not (is_explained(fit) if located is None else located.explains_all):
+        progress(0.6, "checking for a dispersion of the converters")
+        corrected = _search_without_dispersion(state, linearity, laws)
+        if corrected is not state and corrected.result.verdict == DiagnosisVerdict.UNEXPLAINED:
+            located = _locate_unknown_force(corrected)
+        state = corrected
+    result = state.result
+    if located is not None and result.verdict == DiagnosisVerdict.UNEXPLAINED:
         part = LARGELY if _free_force_explains(state.long, located.location) else MOSTLY
-        result = _with_location(result, modal_model, located, part)
+        result = replace(_with_location(result, modal_model, located, part), unknown_force=located)
     if result.fit is None:
         return result
     progress(0.9, "checking the prediction of held-out records")
@@ -256,8 +263,8 @@ def _search_catalogue(data: LawFitData, linearity: Linearity, laws: Sequence[Law
     is_strong = short.mean_misfit > WEAK
     first = partial(make_problem, FIRST_PERIODS / data.training.band_hz[1], ROUGH) if is_strong else None
     fits, gain_of_others = find_candidates(short, long, laws, first=first), cache(partial(_gain_of_other_forces, long))
-    judged = _judge(long, linearity, data.modal_model, fits, gain_of_others)
-    result = replace(judged, dispersion_rad=data.dispersion_rad)
+    judge = partial(_judge, long, linearity, data.modal_model, fits, gain_of_others)
+    result = replace(judge(), dispersion_rad=data.dispersion_rad)
     later = [times * short.duration_s for times in LATER if times * short.duration_s < long.duration_s]
     first_moments = chain([short], (make_problem(duration, FINE) for duration in later))
     if (
@@ -266,6 +273,7 @@ def _search_catalogue(data: LawFitData, linearity: Linearity, laws: Sequence[Law
         and _explains_first_moments(first_moments, result.fit)
     ):
         early = "It explains their first moments; its later misfit grows from small errors of the model."
+        result = replace(judge(always_rescores=True), dispersion_rad=data.dispersion_rad)
         statement = f"{result.findings[0].statement} {early}"
         result = replace(result, verdict=DiagnosisVerdict.EXPLAINED, is_early=True, statement=statement)
     return _SearchState(data=data, short=short, long=long, fits=fits, gain_of_others=gain_of_others, result=result)
@@ -295,7 +303,9 @@ def _locate_unknown_force(state: _SearchState) -> SimpleLawsFit:
         fit for fit in fits if fit.cost < NEAR_BEST * fits[0].cost and fit.location in long.localisation.equivalent
     ][:MAX_NEAR_BEST]
     small = [fit for fit in near_best if gain_of_others(fit) < SMALL_GAIN * fit.cost]
-    beside_law = [SimpleLawsFit.of_problem(long, fit.location, fit.cost - gain_of_others(fit)) for fit in small]
+    beside_law = [
+        SimpleLawsFit.of_problem(long, fit.location, fit.cost - gain_of_others(fit), fit.nuisance) for fit in small
+    ]
     of_each_law = {fit.law.name: fit.location for fit in reversed(fits)}
     alone, by_first_moments = locate_unknown_law(short, long, of_each_law.values())
     best = min(
@@ -348,7 +358,10 @@ def _judge(
     modal_model: ModalModel,
     fits: list[LawFit],
     gain_of_others: Callable[[LawFit], float],
+    *,
+    always_rescores: bool = False,
 ) -> LawSearch:
+    """Judge the best of fits; those that explain equally well are rescored where one of them may explain all."""
     if not fits:
         return LawSearch(
             verdict=DiagnosisVerdict.UNEXPLAINED,
@@ -356,13 +369,10 @@ def _judge(
             modal_model=modal_model,
             statement=f"{DISAGREE}; no law explains it.",
         )
-    fits, drops = _rank(problem, fits)
+    fits, drops = _rank(problem, fits, always_rescores=always_rescores)
     best = fits[0]
     scale = max(1.0, best.cost / best.n_rows)
-    n_locations = len(modal_model.locations)
-    gains = np.array(
-        [log_evidence_gain(fit, drop / scale, n_locations, scale) for fit, drop in zip(fits, drops, strict=True)]
-    )
+    gains = log_evidence_gains(fits, drops / scale, len(modal_model.locations), scale)
     weights = np.exp(gains - gains.max())
     findings = make_findings(modal_model, fits, gains, weights / weights.sum(), scale)
     agreement = assess_agreement(problem.segments, problem.linear.nuisance_prior, best)
@@ -383,7 +393,7 @@ def _judge(
     )
 
 
-def _rank(problem: LawFitProblem, fits: list[LawFit]) -> tuple[list[LawFit], FloatArray]:
+def _rank(problem: LawFitProblem, fits: list[LawFit], *, always_rescores: bool) -> tuple[list[LawFit], FloatArray]:
     """Order fits by their evidence, and give it: half the drop of the cost.
 
     Where that is little, the disagreement of records counts besides, which the model's errors do not hide. Fits that
@@ -393,12 +403,22 @@ def _rank(problem: LawFitProblem, fits: list[LawFit]) -> tuple[list[LawFit], Flo
     if drops[0] < WEAK_EVIDENCE and not problem.segments.moving.any():
         drops += [assess_agreement(problem.segments, problem.linear.nuisance_prior, fit).gain for fit in fits]
     scale = max(1.0, fits[0].cost / fits[0].n_rows)
-    contenders, behind = rescore(problem, fits)
-    fits = contenders + fits[len(contenders) :]
-    if behind.any():
-        drops[: len(contenders)] = drops[: len(contenders)].max() - scale * behind
+    contenders = select_contenders(fits)
+    if len(contenders) > 1 and (
+        always_rescores
+        or any(_may_explain(problem, fit, drop / scale) for fit, drop in zip(contenders, drops, strict=False))
+    ):
+        rescored, behind = rescore(problem, contenders)
+        fits = rescored + fits[len(rescored) :]
+        drops[: len(rescored)] = drops[: len(rescored)].max() - scale * behind
     order = np.argsort(-drops, kind="stable")
     return [fits[i] for i in order], drops[order]
+
+
+def _may_explain(problem: LawFitProblem, fit: LawFit, gain: float) -> bool:
+    """Tell whether nothing speaks against a law but, perhaps, its shape."""
+    agreement = assess_agreement(problem.segments, problem.linear.nuisance_prior, fit)
+    return not _find_objection(problem, fit, agreement, gain, lambda _: 0.0)
 
 
 def _find_objection(

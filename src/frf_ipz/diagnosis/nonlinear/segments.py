@@ -62,8 +62,8 @@ class SegmentSet:
         N s.
     start_force : (n_segments, 2) array
         Force and its slope at the start of segments that start in motion, N and N/s; else 0.
-    fine_force : (n_segments, REFINEMENT * n_samples) array
-        Force on finer times, N.
+    fine_force : (n_segments, steps_per_sample * n_samples) array
+        Force at the time steps of a simulation, N.
     motion : (n_segments, n_sensors, n_lines) complex array
         Responses as displacements, in the signs of the sensors, m s; 0 where a record has no such sensor.
     noise : (n_segments, n_sensors, n_lines) array
@@ -110,6 +110,11 @@ class SegmentSet:
     def duration_s(self) -> float:
         """Length of a segment, s."""
         return self.n_samples * self.step_s
+
+    @property
+    def steps_per_sample(self) -> int:
+        """Time steps of a simulation per sample of the recordings."""
+        return int(self.fine_force.shape[1] // self.n_samples)
 
     @property
     def sigma_1_s(self) -> float:

@@ -15,7 +15,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.channel_noise import read_noise
 from frf_ipz.diagnosis.nonlinear.model.time_response import TimeResponse
 from frf_ipz.diagnosis.nonlinear.model.time_stepping import step_in_time
-from frf_ipz.diagnosis.nonlinear.segments import REFINEMENT, SegmentWindow, cut_segments
+from frf_ipz.diagnosis.nonlinear.segments import SegmentWindow, cut_segments
 from frf_ipz.errors import InputError
 
 if TYPE_CHECKING:
@@ -92,8 +92,8 @@ def simulate(
         measured=measured,
         simulated=responses * is_present,
         without=_sensor_responses(time_response, np.zeros_like(history.force)) * is_present,
-        motion=history.motion[:, ::REFINEMENT],
-        force=history.force[:, ::REFINEMENT],
+        motion=history.motion[:, :: segments.steps_per_sample],
+        force=history.force[:, :: segments.steps_per_sample],
         misfit=_relative_misfit(measured, responses, segments.step_s, observations),
     )
 
@@ -167,13 +167,13 @@ def _sensor_responses(time_response: TimeResponse, law_force: FloatArray) -> Flo
     at_inputs = (modal_model.at_sensors.weights @ modal_model.at_inputs.static)[:, segments.input_of]
     at_location = modal_model.at_sensors.weights @ modal_model.at_locations.static[:, time_response.location]
     static = at_inputs.T[..., None] * segments.fine_force[:, None] - at_location[:, None] * law_force[:, None]
-    responses = np.zeros(static[..., ::REFINEMENT].shape)
+    responses = np.zeros(static[..., :: segments.steps_per_sample].shape)
     for row, sensor in enumerate(modal_model.sensors):
         residual = static[:, row]
         for _ in range(sensor.quantity.power):
             residual = np.gradient(residual, time_response.step_s, axis=-1)
         modal_sum = np.einsum("m,bmt->bt", shapes[row], modal[sensor.quantity.power])
-        responses[:, row] = (modal_sum + residual)[:, ::REFINEMENT]
+        responses[:, row] = (modal_sum + residual)[:, :: segments.steps_per_sample]
     return responses
 
 

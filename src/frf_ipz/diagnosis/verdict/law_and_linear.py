@@ -66,8 +66,11 @@ def search_beside_linear(
     -------
     tuple of LawSearch and Finding, or None
         The law and the linear effect, where two of three hold: the effect explains most of the misfit, the law the
-        rest, and beside the effect the law needs no large nuisance chi2. None where less holds.
+        rest, and beside the effect the law needs no large nuisance chi2. None where less holds, or where a force of
+        unknown law explains all.
     """
+    if _is_force_alone(alone):
+        return None
     null = linear.null
     ranking = linear.ranking if linear.ranking.fits else search_component(problem, null)
     best = ranking.best
@@ -117,7 +120,7 @@ def search_beside_law(
         not even follow the recordings, where no effect reduces it, or where the law explains first moments
         only, with the effect as without it.
     """
-    remaining = _remove_law(observations, laws)
+    remaining = None if _is_force_alone(laws) else _remove_law(observations, laws)
     if remaining is None:
         return None
     explains, problem = laws.verdict == DiagnosisVerdict.EXPLAINED, pose_with_observations(remaining)
@@ -145,6 +148,12 @@ def search_beside_law(
         return None
     scale = max(1.0, best.mean_misfit)
     return laws_beside, make_finding(rank_effects(ranking.fits, scale)[0], log_bayes_factor(best, null), scale)
+
+
+def _is_force_alone(laws: LawSearch) -> bool:
+    """Say whether a force of unknown law leaves nothing, not even a large nuisance chi2, to a linear effect."""
+    force = laws.unknown_force
+    return force is not None and force.explains_all and force.nuisance_chi2 < MAX_NUISANCE_CHI2
 
 
 def _remove_law(observations: Observations, laws: LawSearch) -> Observations | None:

@@ -46,7 +46,7 @@ def test_a_law_is_scaled_by_the_motion_of_a_location_that_moves_alike(monkeypatc
     nuisance_prior = SimpleNamespace(
         modal_model=SimpleNamespace(at_locations=points), without_location=lambda nuisance: nuisance
     )
-    empty = dict.fromkeys(("nuisance", "covariance", "motion", "velocity", "force", "misfit"), np.zeros(0))
+    empty = dict.fromkeys(("nuisance", "estimate_covariance", "motion", "velocity", "force", "misfit"), np.zeros(0))
     law = SimpleNamespace(degree=3)
     fit = LawFit(law=law, location=0, strength=2.0, shape=6.0, cost=1.0, n_rows=1, **empty)
     monkeypatch.setattr(candidates, "_motion_size", lambda _, fit: (3.0, 1.0)[fit.location])

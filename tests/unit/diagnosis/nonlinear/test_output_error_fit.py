@@ -67,9 +67,9 @@ def test_the_shape_at_the_location_of_a_law_is_fitted(cubic):
         iterations=12,
     )
     assert fit.cost < 0.5 * fixed.cost
-    std = np.sqrt(fit.covariance[0, 0])
+    std = np.sqrt(fit.estimate_covariance()[0, 0])
     assert abs(fit.strength - K3) < CERTAIN * std
-    assert abs(fixed.strength - K3) > CERTAIN * np.sqrt(fixed.covariance[0, 0])
+    assert abs(fixed.strength - K3) > CERTAIN * np.sqrt(fixed.estimate_covariance()[0, 0])
 
 
 @pytest.mark.parametrize("size", [pytest.param(1e200, marks=pytest.mark.slow), np.inf])
@@ -80,4 +80,32 @@ def test_derivatives_that_diverge_are_set_to_zero(cubic, monkeypatch, size):
     monkeypatch.setattr(output_error_fit, "step_tangent", lambda *arguments: size * tangent(*arguments))
     fit = fit_output_error(segments, nuisance_prior, start_of(nuisance_prior, location), iterations=2)
     assert np.isfinite(fit.cost)
-    assert np.isfinite(fit.covariance).all()
+    assert np.isfinite(fit.estimate_covariance()).all()
+
+
+def test_a_fit_goes_on_from_its_simulation(cubic, monkeypatch):
+    """The first simulation of further steps is the last one of those before; what is given up needs no covariance."""
+    segments, nuisance_prior, location = cubic
+    calls = {"step_in_time": 0, "step_tangent": 0}
+
+    def counted(name):
+        function = getattr(output_error_fit, name)
+
+        def count(*arguments):
+            calls[name] += 1
+            return function(*arguments)
+
+        return count
+
+    for name in calls:
+        monkeypatch.setattr(output_error_fit, name, counted(name))
+    start = start_of(nuisance_prior, location, strength=0.9 * K3)
+    fit = fit_output_error(segments, nuisance_prior, start, iterations=1)
+    assert calls == {"step_in_time": 2, "step_tangent": 1}
+    further = fit_output_error(segments, nuisance_prior, fit.start(), iterations=1, known=fit.simulation)
+    assert calls == {"step_in_time": 3, "step_tangent": 2}
+    assert further.cost == fit_output_error(segments, nuisance_prior, fit.start(), iterations=1).cost
+    assert calls == {"step_in_time": 5, "step_tangent": 3}
+    other = replace(fit.start(), strength=K3)
+    moved = fit_output_error(segments, nuisance_prior, other, iterations=0, known=fit.simulation)
+    assert moved.cost != fit.cost

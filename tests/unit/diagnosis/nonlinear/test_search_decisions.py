@@ -3,6 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from frf_ipz.diagnosis.location import Location
@@ -17,16 +18,24 @@ LOCATIONS = tuple(range(10))
 
 def law_at(location, cost):
     law = SimpleNamespace(name="cubic")
-    return SimpleNamespace(law=law, location=location, cost=cost, n_rows=100, strength=1.0, converged=True)
+    return SimpleNamespace(
+        law=law, location=location, cost=cost, n_rows=100, strength=1.0, nuisance=np.ones(2), converged=True
+    )
 
 
 def simple_laws_at(location, cost, *, n_rows=100, linear_mean_misfit=50.0):
-    return SimpleLawsFit(location=location, cost=cost, mean_misfit=cost / n_rows, linear_mean_misfit=linear_mean_misfit)
+    return SimpleLawsFit(
+        location=location,
+        cost=cost,
+        mean_misfit=cost / n_rows,
+        linear_mean_misfit=linear_mean_misfit,
+        nuisance_chi2=1.0,
+    )
 
 
 def search_state(fits, gain_of_others):
     long = SimpleNamespace(
-        linear=SimpleNamespace(n_rows=100, cost=100 * 50.0),
+        linear=SimpleNamespace(n_rows=100, cost=100 * 50.0, nuisance_prior=SimpleNamespace(n_structural=2)),
         mean_misfit=50.0,
         localisation=ForceLocalisation(possible=LOCATIONS, equivalent=LOCATIONS),
     )
@@ -166,3 +175,57 @@ def test_a_law_that_explains_all_but_little_of_the_first_moments_counts(
     for is_moving in (False, True):
         problems = (first_moments(cost, afresh=afresh, is_moving=is_moving) for cost, afresh in costs)
         assert search._explains_first_moments(problems, SimpleNamespace()) == explains
+
+
+@pytest.mark.parametrize(("misfit", "is_searched"), [(0.9, False), (1.1, True)])
+def test_no_dispersion_is_searched_where_a_force_of_unknown_law_leaves_nothing(monkeypatch, misfit, is_searched):
+    searched = []
+    unexplained = search.LawSearch(
+        verdict=DiagnosisVerdict.UNEXPLAINED, linearity=None, fit=law_at(3, 900.0), modal_model=at_nodes(*range(9))
+    )
+    state = search_state([law_at(3, 900.0)], lambda _: 0.0)
+    state.result, state.data = unexplained, SimpleNamespace(held_out_segments=lambda _: None)
+    state.long.linear.nuisance_prior = None
+    stubs = {
+        "LawFitData": lambda **_: None,
+        "make_modal_model": lambda *_: unexplained.modal_model,
+        "read_noise": lambda _: None,
+        "_hold_out": lambda _: (None, None),
+        "_search_catalogue": lambda *_: state,
+        "_search_without_dispersion": lambda *_: searched.append("dispersion") or state,
+        "_locate_unknown_force": lambda _: simple_laws_at(5, 100 * misfit),
+        "_free_force_explains": lambda *_: True,
+        "compare_misfits": lambda *_: (None, None, None),
+        "simulate_law_in_time": lambda *_: None,
+    }
+    for name, stub in stubs.items():
+        monkeypatch.setattr(search, name, stub)
+    linearity = SimpleNamespace(is_nonlinear=True)
+    result = search.search_laws(None, None, None, laws=[object()], linearity=linearity)
+    assert result.location == {"nodes": [5]}
+    assert result.unknown_force.explains_all != is_searched
+    assert bool(searched) == is_searched
+
+
+@pytest.mark.parametrize(
+    ("objection", "always", "n_rescored"), [("", False, 2), ("wrong", False, 0), ("wrong", True, 2)]
+)
+def test_fits_are_rescored_where_one_of_them_may_explain(monkeypatch, objection, always, n_rescored):
+    """Two laws explain equally well; another is far behind."""
+    rescored = []
+
+    def rescore(_, contenders):
+        rescored.extend(contenders)
+        return contenders, np.array([5.0, 0.0])
+
+    monkeypatch.setattr(search, "rescore", rescore)
+    monkeypatch.setattr(search, "assess_agreement", lambda *_: Agreement(np.nan, np.nan))
+    monkeypatch.setattr(search, "_find_objection", lambda *_: objection)
+    fits = [law_at(3, 90.0), law_at(4, 91.0), law_at(5, 200.0)]
+    problem = SimpleNamespace(
+        linear=SimpleNamespace(cost=1e5, nuisance_prior=None),
+        segments=SimpleNamespace(moving=np.zeros(2, bool)),
+    )
+    ranked, _ = search._rank(problem, fits, always_rescores=always)
+    assert len(rescored) == n_rescored
+    assert [fit.location for fit in ranked] == ([4, 3, 5] if n_rescored else [3, 4, 5])

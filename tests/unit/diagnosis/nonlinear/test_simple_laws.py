@@ -34,7 +34,13 @@ def test_a_joint_that_slips_gradually_is_a_sum_of_simple_forces(limit):
 
 
 def simple_laws_fit(location, cost, *, n_rows=100, linear_mean_misfit=50.0):
-    return SimpleLawsFit(location=location, cost=cost, mean_misfit=cost / n_rows, linear_mean_misfit=linear_mean_misfit)
+    return SimpleLawsFit(
+        location=location,
+        cost=cost,
+        mean_misfit=cost / n_rows,
+        linear_mean_misfit=linear_mean_misfit,
+        nuisance_chi2=1.0,
+    )
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
+from frf_ipz.diagnosis.nonlinear.laws.law import StepCompliance
 from frf_ipz.diagnosis.nonlinear.model.time_stepping import (
     LocationCompliance,
     discretise_modes,
@@ -13,6 +14,7 @@ from frf_ipz.diagnosis.nonlinear.model.time_stepping import (
 
 OMEGA, RATIO, STEP_S, N_TIMES = 2 * np.pi * 5.0, 0.02, 1e-4, 6000
 SECOND_ORDER = 2e-5  # of the largest motion: the force is linear within steps of 1/2000 of a period
+SAME = 1e-10  # of the largest force: rounding errors of 3000 steps
 DERIVATIVE = 1e-6  # relative: central differences of time histories, with 6 digits left
 
 
@@ -78,6 +80,62 @@ def test_the_tangent_follows_small_changes(name, numbers):
     assert np.linalg.norm(by_change) > 0
     for tangent, difference in zip(solution, (by_change, by_strength), strict=False):
         assert np.linalg.norm(tangent - difference) <= DERIVATIVE * np.linalg.norm(difference)
+
+
+class StepByStep:
+    """A law whose force is asked for one step after the other."""
+
+    def __init__(self, law, compliance):
+        self.law, self.modes, self.outputs = law, compliance.modes, compliance.output_weights.T
+        self.per_unit = compliance.per_unit_force()
+
+    def force(self, numbers, motion, velocity):
+        step, modes = StepCompliance(*self.per_unit, *numbers), self.modes
+        z, forces = np.zeros((len(modes.poles), len(motion)), complex), np.zeros(motion.shape)
+        for k in range(motion.shape[1]):
+            w, v = (self.outputs @ z).imag
+            forces[:, k] = self.law.solve(motion[:, k] + w, velocity[:, k] + v, step)
+            z = modes.turn[:, None] * z - (modes.turn * modes.after + modes.before)[:, None] * forces[:, k]
+        return forces
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers", "most_asked"),
+    [
+        ("cubic_stiffness", (3e6, 0.0), 0.5),
+        ("cubic_stiffness", (-3e4, 0.0), 0.5),
+        ("gap_contact", (4e3, 4e-3), 0.5),
+        ("dry_friction", (12.0, 0.0), 2.0),
+        ("dry_friction", (0.5, 0.0), 2.0),
+    ],
+)
+def test_steps_that_are_taken_at_once_give_what_steps_one_by_one_give(name, numbers, most_asked):
+    """Two modes, two segments, and a last block that is shorter; the law is asked less often than there are steps."""
+    law = shipped_laws()[name]
+    modes = discretise_modes(np.array([OMEGA, 7.3 * OMEGA]), np.array([RATIO, 0.01]), STEP_S, hold=law.holds)
+    compliance, (w, v) = LocationCompliance(modes=modes, weights=np.array([1.0, 0.6])), linear_motion()
+    motion, velocity = np.concatenate([w, 0.3 * w])[:, :3001], np.concatenate([v, 0.3 * v])[:, :3001]
+    expected = StepByStep(law, compliance).force(numbers, motion, velocity)
+    asked = 0
+
+    class Counted(type(law)):
+        def solve(self, w, v, step):
+            """Count."""
+            nonlocal asked
+            asked += 1
+            return super().solve(w, v, step)
+
+    force = step_in_time(Counted(), numbers, compliance, motion, velocity).force
+    assert np.abs(expected).max() > 0
+    assert_allclose(force, expected, rtol=0, atol=SAME * np.abs(expected).max())
+    assert asked < most_asked * motion.shape[1]
+
+
+def test_a_motion_that_diverges_is_not_a_number_to_its_end():
+    law, compliance = shipped_laws()["cubic_stiffness"], oscillator()
+    with np.errstate(all="ignore"):
+        force = step_in_time(law, (-3e8, 0.0), compliance, *linear_motion()).force
+    assert not np.isfinite(force[0, -1])
 
 
 def test_the_tangent_follows_a_small_force_beside_a_law():

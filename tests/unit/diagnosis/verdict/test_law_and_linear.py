@@ -12,6 +12,7 @@ from frf_ipz.diagnosis import diagnose
 from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.measured.preprocessing.chain_effects import undo_chain_effects
 from frf_ipz.diagnosis.model.change import Change, with_change
+from frf_ipz.diagnosis.nonlinear.fitting.simple_laws import SimpleLawsFit
 from frf_ipz.diagnosis.observations import Observations, ObservedRecord, Sensor
 from frf_ipz.diagnosis.search.component_search import search_component
 from frf_ipz.diagnosis.verdict import law_and_linear as law_beside
@@ -34,8 +35,8 @@ def nominal(tmp_path_factory):
     return beam(tmp_path_factory.mktemp("beam"))
 
 
-def a_law(verdict, nuisance_chi2=0.0):
-    return SimpleNamespace(verdict=verdict, nuisance_chi2=nuisance_chi2, fit=object())
+def a_law(verdict, nuisance_chi2=0.0, unknown_force=None):
+    return SimpleNamespace(verdict=verdict, nuisance_chi2=nuisance_chi2, fit=object(), unknown_force=unknown_force)
 
 
 class Laws:
@@ -86,6 +87,22 @@ def test_an_effect_that_relieves_a_strained_model_is_named_beside_a_law_that_doe
     if is_named:
         assert pair[0].verdict == "unexplained"
         assert pair[1].effect == "added_mass"
+
+
+@pytest.mark.parametrize(
+    ("misfit", "nuisance_chi2", "is_searched"), [(0.5, 2.0, False), (0.5, 30.0, True), (2.0, 2.0, True)]
+)
+def test_nothing_is_searched_beside_a_force_of_unknown_law_that_leaves_nothing(
+    nominal, misfit, nuisance_chi2, is_searched
+):
+    frfs = measured(with_point_masses(nominal, {12: MASS_KG}))
+    force = SimpleLawsFit(
+        location=3, cost=misfit, mean_misfit=misfit, linear_mean_misfit=50.0, nuisance_chi2=nuisance_chi2
+    )
+    problem, laws = problem_of(nominal, frfs, ("added_mass",)), Laws("explained")
+    decision, alone = decide_without_search(problem), a_law("unexplained", unknown_force=force)
+    assert (search_beside_linear(problem, decision, alone, nominal, observed(frfs), laws) is not None) == is_searched
+    assert bool(laws.given) == is_searched
 
 
 def test_records_that_agree_beside_a_linear_effect_are_no_law(nominal):
@@ -209,6 +226,7 @@ def test_a_law_that_runs_away_later_in_a_record_is_not_taken_out(nominal, monkey
         fit=object(),
         nuisance_prior=SimpleNamespace(moving=()),
         dispersion_rad=0.0,
+        unknown_force=None,
     )
     assert search_beside_law(pytest.fail, law, nominal, observations, pytest.fail) is None
 

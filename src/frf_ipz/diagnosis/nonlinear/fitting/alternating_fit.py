@@ -7,6 +7,7 @@ takes one Gauss-Newton step in all parameters together. The best round counts.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,9 @@ from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import solve_with_prio
 from frf_ipz.diagnosis.nonlinear.model.modal_model import ModalResponse, respond
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import Simulation
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
     from frf_ipz.diagnosis.nonlinear.model.nuisance_prior import NuisancePrior
     from frf_ipz.diagnosis.nonlinear.segments import SegmentSet
@@ -46,8 +50,9 @@ class LawFit:
         Weighted sum of squared misfits, and of squared nuisance parameters.
     n_rows : int
         Number of real data.
-    covariance : (2, 2) array
-        Of strength and shape, all nuisance parameters free, for data whose variance is right.
+    estimate_covariance : callable
+        Gives the (2, 2) covariance of strength and shape, all nuisance parameters free, for data whose variance is
+        right. It is asked of few of many fits.
     motion, velocity : (n_segments, n_times) array
         Of the location, m and m/s.
     force : (n_segments, n_lines) complex array
@@ -56,6 +61,8 @@ class LawFit:
         Weighted, measured minus fitted.
     converged : bool
         Further steps would not lower the cost.
+    simulation : Simulation, optional
+        Of an output-error fit that further steps may start from.
     """
 
     law: Law
@@ -65,19 +72,21 @@ class LawFit:
     nuisance: FloatArray
     cost: float
     n_rows: int
-    covariance: FloatArray
+    estimate_covariance: Callable[[], FloatArray]
     motion: FloatArray
     velocity: FloatArray
     force: ComplexArray
     misfit: FloatArray
     converged: bool = False
+    simulation: Simulation | None = None
 
     @property
     def numbers(self) -> dict[str, tuple[float, float]]:
         """The law's parameters by their names, each with its variance."""
-        numbers = {self.law.strength_name: (self.strength, float(self.covariance[0, 0]))}
+        covariance = self.estimate_covariance()
+        numbers = {self.law.strength_name: (self.strength, float(covariance[0, 0]))}
         if self.law.shape_name:
-            numbers[self.law.shape_name] = (self.shape, float(self.covariance[1, 1]))
+            numbers[self.law.shape_name] = (self.shape, float(covariance[1, 1]))
         return numbers
 
     def start(self, nuisance: FloatArray | None = None) -> LawStart:
@@ -225,7 +234,7 @@ def _fit_round(
         nuisance=nuisance,
         cost=float(remaining @ remaining + nuisance @ nuisance),
         n_rows=len(remaining),
-        covariance=np.pad(covariance, (0, 2 - len(covariance))),
+        estimate_covariance=partial(np.pad, covariance, (0, 2 - len(covariance))),
         motion=w,
         velocity=v,
         force=strength * laplace.at_lines(law.unit_force(w, v, shape)),

@@ -216,10 +216,14 @@ def _simulate(
     """Fit by simulation; those whose cost after a few steps is too far above the least, only so far."""
     simulated = [problem.fit_output_error(fit, FIRST_STEPS) for fit in fits]
     least = min(least, *(fit.cost for fit in simulated)) if simulated else least
-    return [
-        fit if fit.converged or fit.cost > max_ratio * least else problem.fit_output_error(fit, MORE_STEPS)
-        for fit in simulated
-    ]
+    return [_continue_promising(problem, fit, is_promising=fit.cost <= max_ratio * least) for fit in simulated]
+
+
+def _continue_promising(problem: LawFitProblem, fit: LawFit, *, is_promising: bool) -> LawFit:
+    """Fit further unless it has converged; forget the simulation of what is given up, which takes memory."""
+    if not is_promising:
+        return replace(fit, simulation=None)
+    return fit if fit.converged else problem.fit_output_error(fit, MORE_STEPS)
 
 
 def _converge_best(problem: LawFitProblem, fits: list[LawFit]) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,7 +27,6 @@ from frf_ipz.diagnosis.nonlinear.model.time_stepping import (
     step_in_time,
     step_tangent,
 )
-from frf_ipz.diagnosis.nonlinear.segments import REFINEMENT
 from frf_ipz.numerics.levenberg_marquardt import LeastSquaresStatus, LevenbergMarquardt, NormalEquations, minimise
 
 if TYPE_CHECKING:
@@ -47,9 +47,23 @@ ForceBasis = Callable[[FloatArray, FloatArray], FloatArray]
 WEAK_PRIOR = 1e-6  # on relative changes of strength and shape: without contact, they are not determined separately
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Simulation:
-    """A simulation of all segments."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Simulation:
+    """A simulation of all segments.
+
+    Parameters
+    ----------
+    start : LawStart
+        The law at its location, and the nuisance parameters.
+    response, time_response, compliance
+        Of the linear model.
+    history : TimeHistory
+        Of the law.
+    force : (n_segments, n_lines) complex array
+        Of the law against the structure, N s.
+    misfit : (n_rows,) array
+        Weighted, measured minus simulated.
+    """
 
     start: LawStart
     response: ModalResponse
@@ -61,13 +75,36 @@ class _Simulation:
 
     @property
     def cost(self) -> float:
+        """Weighted sum of squared misfits, and of squared nuisance parameters; infinite where the motion diverges."""
         with np.errstate(all="ignore"):  # of a motion that diverges
             cost = float(self.misfit @ self.misfit + self.start.nuisance @ self.start.nuisance)
         return cost if np.isfinite(cost) else np.inf
 
+    @cached_property
+    def equations(self) -> NormalEquations:
+        """Derivatives by nuisance, strength and shape."""
+        return _normal_equations(self, _derivative_rows(self))
+
+    def is_of(self, segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart) -> bool:
+        """Tell whether these data would be simulated with these numbers."""
+        simulated, time_response = self.start, self.time_response
+        return (
+            time_response.segments is segments
+            and time_response.nuisance_prior is nuisance_prior
+            and simulated.law is start.law
+            and (simulated.location, simulated.strength, simulated.shape)
+            == (start.location, start.strength, start.shape)
+            and np.array_equal(simulated.nuisance, start.nuisance)
+        )
+
 
 def fit_output_error(
-    segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart, *, iterations: int = 6
+    segments: SegmentSet,
+    nuisance_prior: NuisancePrior,
+    start: LawStart,
+    *,
+    iterations: int = 6,
+    known: Simulation | None = None,
 ) -> LawFit:
     """Fit a law at a location.
 
@@ -81,6 +118,8 @@ def fit_output_error(
         Law, location, and first values; the strength is not zero.
     iterations : int
         Steps at most; with 0 the start is only simulated.
+    known : Simulation, optional
+        Used where it is one of the start with these segments.
 
     Returns
     -------
@@ -88,13 +127,14 @@ def fit_output_error(
         The best simulation.
     """
     problem = _OutputErrorProblem(segments=segments, nuisance_prior=nuisance_prior)
-    simulation = _simulate(segments, nuisance_prior, start)
+    is_known = known is not None and known.is_of(segments, nuisance_prior, start)
+    simulation = known if known is not None and is_known else _simulate(segments, nuisance_prior, start)
     while not np.isfinite(simulation.cost):  # a softening spring that is too strong diverges
         weaker = replace(simulation.start, strength=WEAKER * simulation.start.strength)
         simulation = _simulate(segments, nuisance_prior, weaker)
     optimum = minimise(problem, simulation, replace(SETTINGS, steps=iterations))
     converged = optimum.status in {LeastSquaresStatus.CONVERGED, LeastSquaresStatus.STALLED}
-    return _as_law_fit(optimum.point, optimum.linearise(), converged=converged)
+    return _as_law_fit(optimum.point, converged=converged)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -104,15 +144,15 @@ class _OutputErrorProblem:
     segments: SegmentSet
     nuisance_prior: NuisancePrior
 
-    def cost(self, simulation: _Simulation) -> float:
+    def cost(self, simulation: Simulation) -> float:
         """Give the cost; infinite where the motion diverges."""
         return simulation.cost
 
-    def linearise(self, simulation: _Simulation) -> NormalEquations:
+    def linearise(self, simulation: Simulation) -> NormalEquations:
         """Derive by nuisance, strength and shape."""
-        return _normal_equations(simulation, _derivative_rows(self.segments, self.nuisance_prior, simulation))
+        return simulation.equations
 
-    def move(self, simulation: _Simulation, _equations: NormalEquations, step: FloatArray) -> _Simulation:
+    def move(self, simulation: Simulation, _equations: NormalEquations, step: FloatArray) -> Simulation:
         """Simulate after a step that changes no parameter of the law by much."""
         start, n = simulation.start, len(simulation.start.nuisance)
         step = step * min(1.0, LONGEST / max(float(np.abs(step[n:]).max()), 1e-300))
@@ -148,7 +188,7 @@ def gain_of_added_forces(
     """
     simulation = _simulate(segments, nuisance_prior, start)
     forces = force_basis(simulation.history.motion, simulation.history.velocity)
-    rows = _derivative_rows(segments, nuisance_prior, simulation, forces)
+    rows = _derivative_rows(simulation, forces)
     n_plain = len(rows) - len(forces)
     sizes = np.linalg.norm(rows[n_plain:], axis=1)
     rows[n_plain:] /= np.maximum(sizes, 1e-300)[:, None]
@@ -158,7 +198,7 @@ def gain_of_added_forces(
     return float(drops[1] - drops[0])
 
 
-def _simulate(segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart) -> _Simulation:
+def _simulate(segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart) -> Simulation:
     time_response = TimeResponse(
         segments=segments, nuisance_prior=nuisance_prior, nuisance=start.nuisance, location=start.location
     )
@@ -174,7 +214,7 @@ def _simulate(segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawSta
         motion = linear_sensor_motion(segments, nuisance_prior, response) - by_law
         motion[nuisance_prior.moving] += nuisance_prior.sensor_free_vibration(start.nuisance, response)
         misfit = as_real_rows((segments.motion - motion)[:, :, used] / np.sqrt(segments.variance[:, :, used]))
-    return _Simulation(
+    return Simulation(
         start=start,
         response=response,
         time_response=time_response,
@@ -187,17 +227,16 @@ def _simulate(segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawSta
 
 def _transform_force(segments: SegmentSet, force: FloatArray, *, holds: bool) -> ComplexArray:
     """Transform a law's force; one that is held for a step acts around its time as in `discretise_modes`."""
-    laplace = NumericalLaplace(segments, oversampling=REFINEMENT, fades=False)
+    laplace = NumericalLaplace(segments, oversampling=segments.steps_per_sample, fades=False)
     lines = laplace.at_lines(np.where(np.isfinite(force), force, 0.0))
     lines[~np.isfinite(force).all(-1)] = np.inf
     angle = segments.s * laplace.step_s
     return lines * (np.expm1(HOLD_LEAD * angle) - np.expm1((HOLD_LEAD - 1) * angle)) / angle if holds else lines
 
 
-def _derivative_rows(
-    segments: SegmentSet, nuisance_prior: NuisancePrior, simulation: _Simulation, added: FloatArray | None = None
-) -> FloatArray:
+def _derivative_rows(simulation: Simulation, added: FloatArray | None = None) -> FloatArray:
     """Derive the weighted responses by nuisance, strength and shape (times their size), and added forces."""
+    segments, nuisance_prior = simulation.time_response.segments, simulation.time_response.nuisance_prior
     start, used, n_free = simulation.start, segments.used, len(nuisance_prior.modes)
     changes = simulation.time_response.derivatives(simulation.history.force)
     with np.errstate(all="ignore"):  # derivatives that diverge are set to zero below
@@ -227,7 +266,7 @@ def _derivative_rows(
     return np.where(np.abs(real_rows).max(axis=1, keepdims=True) < DIVERGED, real_rows, 0.0)
 
 
-def _normal_equations(simulation: _Simulation, rows: FloatArray) -> NormalEquations:
+def _normal_equations(simulation: Simulation, rows: FloatArray) -> NormalEquations:
     n = len(simulation.start.nuisance)
     prior = np.full(len(rows), WEAK_PRIOR)
     prior[:n] = 1.0
@@ -236,13 +275,8 @@ def _normal_equations(simulation: _Simulation, rows: FloatArray) -> NormalEquati
     return NormalEquations(matrix=rows @ rows.T + np.diag(prior), right=right)
 
 
-def _as_law_fit(simulation: _Simulation, equations: NormalEquations, *, converged: bool) -> LawFit:
-    start, n = simulation.start, len(simulation.start.nuisance)
-    n_law = len(equations.right) - n
-    inverse = solve_scaled(equations.matrix, np.eye(n + n_law)[:, n:])[n:]
-    sizes = np.array([start.strength, start.shape])[:n_law]
-    covariance = np.zeros((2, 2))
-    covariance[: len(sizes), : len(sizes)] = inverse * sizes * sizes[:, None]
+def _as_law_fit(simulation: Simulation, *, converged: bool) -> LawFit:
+    start, time_response = simulation.start, simulation.time_response
     return LawFit(
         law=start.law,
         location=start.location,
@@ -251,10 +285,22 @@ def _as_law_fit(simulation: _Simulation, equations: NormalEquations, *, converge
         nuisance=start.nuisance,
         cost=simulation.cost,
         n_rows=len(simulation.misfit),
-        covariance=covariance,
+        estimate_covariance=cache(partial(_covariance, time_response.segments, time_response.nuisance_prior, start)),
         motion=simulation.history.motion,
         velocity=simulation.history.velocity,
         force=simulation.force,
         misfit=simulation.misfit,
         converged=converged,
+        simulation=simulation,
     )
+
+
+def _covariance(segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart) -> FloatArray:
+    """(2, 2) covariance of strength and shape."""
+    equations, n = _simulate(segments, nuisance_prior, start).equations, len(start.nuisance)
+    n_law = len(equations.right) - n
+    inverse = solve_scaled(equations.matrix, np.eye(n + n_law)[:, n:])[n:]
+    sizes = np.array([start.strength, start.shape])[:n_law]
+    covariance = np.zeros((2, 2))
+    covariance[: len(sizes), : len(sizes)] = inverse * sizes * sizes[:, None]
+    return covariance

@@ -86,7 +86,10 @@ class LawFitProblem:
         nuisance = fit.nuisance
         if len(nuisance) != len(self.linear.nuisance) or fit.n_rows != self.linear.n_rows:
             nuisance = np.concatenate([fit.nuisance[:n_structural], self.linear.nuisance[n_structural:]])
-        return fit_output_error(self.segments, self.linear.nuisance_prior, fit.start(nuisance), iterations=iterations)
+        start = fit.start(nuisance)
+        return fit_output_error(
+            self.segments, self.linear.nuisance_prior, start, iterations=iterations, known=fit.simulation
+        )
 
     def fit_output_error_afresh(self, fit: LawFit, iterations: int) -> LawFit:
         """Fit a law by simulation from its parameters and the nominal linear model."""

@@ -30,30 +30,43 @@ STEPS, ROUNDS = 12, 2  # of each fit under a new variance, and of new variances
 MODEL_WRONG = 4.0  # mean square over the expected one: with more, the model is wrong, not its variance
 
 
-def rescore(problem: LawFitProblem, fits: Sequence[LawFit]) -> tuple[list[LawFit], FloatArray]:
-    """Rescore the best fits.
+def select_contenders(fits: Sequence[LawFit]) -> list[LawFit]:
+    """Select fits that explain equally well.
+
+    Parameters
+    ----------
+    fits : sequence of LawFit
+        To the same data, the smallest cost first.
+
+    Returns
+    -------
+    list of LawFit
+        The first of them; one alone where no other is close, or where none explains.
+    """
+    contenders = list(takewhile(lambda fit: fit.cost <= (1 + MAX_DIFFERENCE) * fits[0].cost, fits[:MAX_FITS]))
+    return contenders[:1] if contenders[0].cost > MODEL_WRONG * contenders[0].n_rows else contenders
+
+
+def rescore(problem: LawFitProblem, contenders: Sequence[LawFit]) -> tuple[list[LawFit], FloatArray]:
+    """Rescore fits that explain equally well.
 
     Parameters
     ----------
     problem : LawFitProblem
         The data.
-    fits : sequence of LawFit
-        Fitted to them, the smallest cost first.
+    contenders : sequence of LawFit
+        Fitted to them.
 
     Returns
     -------
     fits : list of LawFit
-        The first of them, in the same order, fitted with the variance that each leaves; cost and misfit are for the
-        variance of the data. Unchanged, where no other fit is close to the best.
+        In the same order, fitted with the variance that each leaves; cost and misfit are for the variance of the data.
     behind : (n_fits,) array
         Log evidence that each lacks against the best of them.
     """
-    contenders = list(takewhile(lambda fit: fit.cost <= (1 + MAX_DIFFERENCE) * fits[0].cost, fits[:MAX_FITS]))
-    if len(contenders) == 1 or contenders[0].cost > MODEL_WRONG * contenders[0].n_rows:
-        return contenders, np.zeros(len(contenders))
-    contenders = [_reweight(problem, fit) for fit in contenders]
-    log_evidence = np.array([_log_evidence(problem.segments, fit) for fit in contenders])
-    return contenders, log_evidence.max() - log_evidence
+    rescored = [_reweight(problem, fit) for fit in contenders]
+    log_evidence = np.array([_log_evidence(problem.segments, fit) for fit in rescored])
+    return rescored, log_evidence.max() - log_evidence
 
 
 def _reweight(problem: LawFitProblem, fit: LawFit) -> LawFit:

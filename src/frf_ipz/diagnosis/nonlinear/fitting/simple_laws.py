@@ -49,6 +49,8 @@ class SimpleLawsFit:
         Weighted sum of squared misfits, and of squared nuisance parameters.
     mean_misfit, linear_mean_misfit : float
         The cost, and that of the linear model, over the number of data.
+    nuisance_chi2 : float
+        Mean square of the structure's nuisance parameters beside the force, in prior standard deviations.
     ambiguity_set : tuple of int
         Locations at which such sums explain as well, with itself, the best first; empty where others were not compared.
     """
@@ -57,16 +59,23 @@ class SimpleLawsFit:
     cost: float
     mean_misfit: float
     linear_mean_misfit: float
+    nuisance_chi2: float
     ambiguity_set: tuple[int, ...] = ()
 
+    @property
+    def explains_all(self) -> bool:
+        """No more is left than expected."""
+        return self.mean_misfit < 1
+
     @classmethod
-    def of_problem(cls, problem: LawFitProblem, location: int, cost: float) -> SimpleLawsFit:
+    def of_problem(cls, problem: LawFitProblem, location: int, cost: float, nuisance: FloatArray) -> SimpleLawsFit:
         """Compare the cost of a force at a location with the data and the linear model of a problem."""
         return cls(
             location=location,
             cost=cost,
             mean_misfit=cost / problem.linear.n_rows,
             linear_mean_misfit=problem.mean_misfit,
+            nuisance_chi2=float(np.mean(nuisance[: problem.linear.nuisance_prior.n_structural] ** 2)),
         )
 
 
@@ -154,7 +163,7 @@ def fit_simple_laws(problem: LawFitProblem, location: int, n_rounds: int) -> Sim
         before, best = best, min(best, float(remaining @ remaining + nuisance @ nuisance))
         if best > (1 - CONVERGED) * before:
             break
-    return SimpleLawsFit.of_problem(problem, location, best)
+    return SimpleLawsFit.of_problem(problem, location, best, nuisance)
 
 
 def simple_forces(w: FloatArray, v: FloatArray) -> FloatArray:

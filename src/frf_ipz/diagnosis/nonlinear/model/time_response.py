@@ -9,7 +9,6 @@ import numpy as np
 
 from frf_ipz.arrays import FloatArray
 from frf_ipz.diagnosis.nonlinear.model.time_stepping import DiscreteModes, LocationCompliance, discretise_modes
-from frf_ipz.diagnosis.nonlinear.segments import REFINEMENT
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.nonlinear.model.modal_model import NuisanceValues
@@ -45,7 +44,7 @@ class TimeResponse:
     @property
     def step_s(self) -> float:
         """Time step, s."""
-        return self.segments.step_s / REFINEMENT
+        return self.segments.step_s / self.segments.steps_per_sample
 
     @property
     def shapes(self) -> FloatArray:

@@ -5,6 +5,10 @@ over the damped frequency is the displacement. A step sums samples of the exact 
 sum is a constant to the fourth order, h^2/12 of the force, which is subtracted (for a free mass that is the method of
 Numerov, 1924). Modes that turn too far in a step take forces that are linear in time.
 At the end of each step the law is solved for the force that fits the motion that it itself changes.
+
+Many steps are taken at once. A force moves its location at later steps only, so that its feedback within a block of
+steps is a triangular matrix, the sampled impulse response; a law is solved in a block by Newton's method, and its
+derivatives by all parameters together are one triangular system. The results are those of steps one by one.
 """
 
 from __future__ import annotations
@@ -13,17 +17,23 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg.lapack import dtrtrs
 from scipy.signal import lfilter
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.laws.law import StepCompliance
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
 
 DIFFERENCE = 1e-6  # of a size: step of a derivative, half the digits of double precision
 SMALLEST = 1e-300
 SLOW = 1.0  # rad that a mode turns in a step: up to there its samples distinguish it from its aliases
+BLOCK_STEPS = 32  # that are taken at once: a longer triangle costs more than the calls that it saves
+HALF = 0.5  # of an error: rounds that leave more are too many
+PRECISION = 1e-12  # of the largest force so far: what a round may leave, next to which rounding of all steps shows
 HOLD_LEAD = 0.6  # part of a step: at 1/2 a held force is neither early nor late, above it does not ring while it sticks
 
 
@@ -163,6 +173,93 @@ class LocationCompliance:
         return np.asarray((self.modes.after @ self.output_weights).imag)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _StepBlock:
+    """Many time steps at once: how a location moves by the state before them, and by the forces in them.
+
+    No step feels forces of later ones: the matrices by forces are strictly lower triangular.
+
+    Parameters
+    ----------
+    by_state : (2 n_modes, 2 n_steps) array
+        Motions, then velocities, by the real and imaginary parts of z at the first step.
+    by_force : (2, n_steps, n_steps) array
+        Motion and velocity at a step (row) that a unit force at an earlier one (column) subtracts.
+    state_by_state, state_by_force : (2 n_modes, 2 n_modes) and (n_steps, 2 n_modes) array
+        z at the first step of the next block.
+    """
+
+    by_state: FloatArray
+    by_force: FloatArray
+    state_by_state: FloatArray
+    state_by_force: FloatArray
+
+    @classmethod
+    def of_compliance(cls, compliance: LocationCompliance, n_steps: int) -> _StepBlock:
+        """Sum the modes of a location."""
+        modes = compliance.modes
+        powers = modes.turn[:, None] ** np.arange(n_steps + 1)
+        per_force = modes.turn * modes.after + modes.before
+        response = compliance.output_weights[:, :, None] * powers[:, None, :n_steps]  # mode, motion or velocity, step
+        kernel = np.einsum("mok,m->ok", response, per_force).imag
+        delay = np.arange(n_steps)[:, None] - np.arange(n_steps) - 1
+        by_force = -(per_force * powers[:, n_steps - 1 :: -1].T)
+        real, imaginary = np.diag(powers[:, -1].real), np.diag(powers[:, -1].imag)
+        return cls(
+            by_state=np.concatenate([response.imag, response.real]).reshape(-1, 2 * n_steps),
+            by_force=np.where(delay >= 0, kernel[:, np.maximum(delay, 0)], 0.0),
+            state_by_state=np.block([[real, imaginary], [-imaginary, real]]),
+            state_by_force=np.concatenate([by_force.real, by_force.imag], 1),
+        )
+
+    @property
+    def n_steps(self) -> int:
+        """Number of time steps."""
+        return len(self.state_by_force)
+
+    def move_freely(self, state: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(..., n_steps) motion and velocity by the state before."""
+        both = state @ self.by_state
+        return both[..., : self.n_steps], both[..., self.n_steps :]
+
+    def advance(self, state: FloatArray, force: FloatArray) -> FloatArray:
+        """(..., 2 n_modes) state of the next block, from this block's and its forces, (..., n_steps)."""
+        return np.asarray(state @ self.state_by_state + force @ self.state_by_force)
+
+    def feed_back(self, force: FloatArray, by_motion: FloatArray, by_velocity: FloatArray) -> FloatArray:
+        """Let forces change the motion, and through the slopes of a law the forces of later steps.
+
+        Parameters
+        ----------
+        force : (n_segments, n_columns, n_steps) array
+            In the motion without it, N.
+        by_motion, by_velocity : (n_segments, n_steps) array
+            Slopes of the law, N/m and N s/m.
+
+        Returns
+        -------
+        (n_segments, n_columns, n_steps) array
+            N.
+        """
+        to_motion, to_velocity = self.by_force
+        slopes = by_motion[..., None] * to_motion + by_velocity[..., None] * to_velocity
+        result = force.copy()
+        for number in np.flatnonzero(by_motion.any(1) | by_velocity.any(1)):
+            # transposed, rows of numpy are columns of LAPACK; the diagonal is one
+            solved, _ = dtrtrs(slopes[number].T, force[number].T, lower=0, trans=1, unitdiag=1)
+            result[number] = solved.T
+        return result
+
+
+def _split_into_blocks(compliance: LocationCompliance, n_times: int) -> Iterator[tuple[slice, _StepBlock]]:
+    """Give the times of each block with its matrices; the last block may be shorter."""
+    block = _StepBlock.of_compliance(compliance, min(BLOCK_STEPS, n_times))
+    for first in range(0, n_times, BLOCK_STEPS):
+        if first + block.n_steps > n_times:
+            block = _StepBlock.of_compliance(compliance, n_times - first)
+        yield slice(first, first + block.n_steps), block
+
+
 def step_in_time(
     law: Law, numbers: tuple[float, float], compliance: LocationCompliance, motion: FloatArray, velocity: FloatArray
 ) -> TimeHistory:
@@ -184,29 +281,93 @@ def step_in_time(
     TimeHistory
         Force and motion.
     """
-    outputs, modes = compliance.output_weights.T, compliance.modes
     per_unit = compliance.per_unit_force()
     step = StepCompliance(float(per_unit[0]), float(per_unit[1]), *numbers)
-    n_segments, n_times = motion.shape
-    turn, per_force = modes.turn[:, None], (modes.turn * modes.after + modes.before)[:, None]
-    z = np.zeros((len(turn), n_segments), complex)  # by the law's force in all earlier steps
-    forces, free = np.zeros((n_times, n_segments)), np.ascontiguousarray(np.stack([motion.T, velocity.T], 1))
-    for k in range(n_times):
-        at_step = free[k]
-        at_step += (outputs @ z).imag
-        force = law.solve(at_step[0], at_step[1], step)
-        z *= turn
-        z -= per_force * force
-        forces[k] = force
-    free_motion, free_velocity = free[:, 0].T, free[:, 1].T
+    differences = _difference_step(motion), _difference_step(velocity)
+    state = np.zeros((len(motion), 2 * len(compliance.weights)))  # by the law's force in all earlier steps
+    force, free_motion, free_velocity = (np.zeros(motion.shape) for _ in range(3))
+    held, largest = np.zeros(len(motion)), SMALLEST
+    for times, block in _split_into_blocks(compliance, motion.shape[1]):
+        by_motion, by_velocity = block.move_freely(state)
+        law_block = _LawBlock(
+            law=law,
+            step=step,
+            block=block,
+            motion=motion[:, times] + by_motion,
+            velocity=velocity[:, times] + by_velocity,
+            differences=differences,
+        )
+        force[:, times] = law_block.solve(held, largest)
+        free_motion[:, times], free_velocity[:, times] = law_block.free_motion(force[:, times])
+        held, largest = force[:, times.stop - 1], max(largest, float(np.abs(force[:, times]).max()))
+        state = block.advance(state, force[:, times])
     return TimeHistory(
-        force=np.ascontiguousarray(forces.T),
-        motion=free_motion - step.motion * forces.T,
-        velocity=free_velocity - step.velocity * forces.T,
+        force=force,
+        motion=free_motion - step.motion * force,
+        velocity=free_velocity - step.velocity * force,
         free_motion=free_motion,
         free_velocity=free_velocity,
         step=step,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _LawBlock:
+    """A law in a block of time steps.
+
+    Parameters
+    ----------
+    law, step, block
+        The law, its parameters with the compliance of a step, and the time steps.
+    motion, velocity : (n_segments, n_steps) array
+        Of the location without the law's forces of this block, m and m/s.
+    differences : pair of float
+        Of motion and velocity, for the slopes of the law.
+    """
+
+    law: Law
+    step: StepCompliance
+    block: _StepBlock
+    motion: FloatArray
+    velocity: FloatArray
+    differences: tuple[float, float]
+
+    def free_motion(self, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Motion and velocity without the force of the same step."""
+        by_motion, by_velocity = self.block.by_force
+        return self.motion - force @ by_motion.T, self.velocity - force @ by_velocity.T
+
+    def solve(self, held: FloatArray, largest: float) -> FloatArray:
+        """Find the forces by Newton's method, as long as each round halves the error; what it leaves step by step.
+
+        Each round makes at least one more step exact, and all where the law has no kink there; where friction switches
+        every few steps, rounds are of little use. They start from a force that is held, (n_segments,).
+        """
+        if not np.isfinite(self.motion).all():  # a motion that has diverged
+            return np.full(self.motion.shape, np.nan)
+        w, v = self.free_motion(np.repeat(held[:, None], self.block.n_steps, axis=1))
+        force, before = self.law.solve(w, v, self.step), np.inf
+        while True:
+            w, v = self.free_motion(force)
+            by_law = self.law.solve(w, v, self.step)
+            error, negligible = np.abs(by_law - force), PRECISION * max(largest, float(np.abs(by_law).max()))
+            size = float(error.max())
+            if size <= negligible:
+                return by_law
+            if not size < HALF * before:  # or not finite
+                return self._solve_singly(force, int(np.argmax(~(error <= negligible).all(0))))
+            in_motion, in_velocity = self.differences
+            by_motion = (self.law.solve(w + in_motion, v, self.step) - by_law) / in_motion
+            by_velocity = (self.law.solve(w, v + in_velocity, self.step) - by_law) / in_velocity
+            force = force + self.block.feed_back((by_law - force)[:, None], by_motion, by_velocity)[:, 0]
+            before = size
+
+    def _solve_singly(self, force: FloatArray, first: int) -> FloatArray:
+        """Find the force of one step after the other, from a first one on."""
+        for k in range(first, self.block.n_steps):
+            by_motion, by_velocity = (force[:, :k] @ self.block.by_force[:, k, :k].T).T
+            force[:, k] = self.law.solve(self.motion[:, k] - by_motion, self.velocity[:, k] - by_velocity, self.step)
+        return force
 
 
 def step_tangent(
@@ -241,25 +402,21 @@ def step_tangent(
         feedback = 1 - history.step.motion * by_motion - history.step.velocity * by_velocity
         by_numbers = np.concatenate([by_numbers, added * feedback])
     direct = np.concatenate([changes[:, 0] * by_motion + changes[:, 1] * by_velocity, by_numbers])
-    force = np.ascontiguousarray(direct.transpose(2, 1, 0))  # time, segment, change: without the motion by themselves
-    slopes = np.stack([by_motion.T, by_velocity.T], 1)[..., None]
-    outputs, modes = np.ascontiguousarray(compliance.output_weights.T), compliance.modes
-    turn, per_force = modes.turn[:, None], -(modes.turn * modes.after + modes.before)[:, None]
-    z = np.zeros((len(turn), force[0].size), complex)
-    increment = np.empty_like(z)
-    for at_step, (to_motion, to_velocity) in zip(force, slopes, strict=True):
-        motion, velocity = (outputs @ z).imag.reshape(2, *at_step.shape)
-        at_step += to_motion * motion + to_velocity * velocity
-        z *= turn
-        z += np.multiply(per_force, at_step.reshape(1, -1), out=increment)
-    return np.ascontiguousarray(force.transpose(2, 1, 0))
+    force = np.ascontiguousarray(direct.transpose(1, 0, 2))  # segment, change, time: without the motion by themselves
+    state = np.zeros((*force.shape[:2], 2 * len(compliance.weights)))
+    for times, block in _split_into_blocks(compliance, force.shape[-1]):
+        to_motion, to_velocity = by_motion[:, times], by_velocity[:, times]
+        motion, velocity = block.move_freely(state)
+        force[..., times] += to_motion[:, None] * motion + to_velocity[:, None] * velocity
+        force[..., times] = block.feed_back(force[..., times], to_motion, to_velocity)
+        state = block.advance(state, force[..., times])
+    return np.ascontiguousarray(force.transpose(1, 0, 2))
 
 
 def _force_derivatives(law: Law, history: TimeHistory) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Derive the force by free motion and velocity, and by the law's parameters times their size."""
     w, v, step = history.free_motion, history.free_velocity, history.step
-    motion_step = DIFFERENCE * max(float(np.abs(w).max()), SMALLEST)
-    velocity_step = DIFFERENCE * max(float(np.abs(v).max()), SMALLEST)
+    motion_step, velocity_step = _difference_step(w), _difference_step(v)
     by_motion = (law.solve(w + motion_step, v, step) - law.solve(w - motion_step, v, step)) / (2 * motion_step)
     by_velocity = (law.solve(w, v + velocity_step, step) - law.solve(w, v - velocity_step, step)) / (2 * velocity_step)
     by_numbers = []
@@ -269,3 +426,8 @@ def _force_derivatives(law: Law, history: TimeHistory) -> tuple[FloatArray, Floa
         change = law.solve(w, v, StepCompliance(**up)) - law.solve(w, v, StepCompliance(**down))
         by_numbers.append(change / (2 * DIFFERENCE))
     return by_motion, by_velocity, np.array(by_numbers)
+
+
+def _difference_step(values: FloatArray) -> float:
+    """Step of a derivative by values of this size."""
+    return DIFFERENCE * max(float(np.abs(values).max()), SMALLEST)
