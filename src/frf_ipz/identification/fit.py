@@ -277,8 +277,17 @@ def _shared_noise_factors(frfs: FrfSet, fitted: FittedModes) -> FloatArray:
     is_alone &= fitted.force_error is None or fitted.lines.force_noise is not None
     if fitted.poles_are_held or not is_alone:
         return np.ones(2 * len(fitted.fit.poles))
-    windowed_s = 1 / float(np.median(np.diff(frfs.frequency_hz))) if frfs.window_decay_1_s > 0.0 else 0.0
-    return shared_noise_factors(fitted.lines, fitted.fit, fitted.terms, windowed_s=windowed_s)
+    return shared_noise_factors(fitted.lines, fitted.fit, fitted.terms, windowed_s=_length_under_window_s(frfs))
+
+
+def _length_under_window_s(frfs: FrfSet) -> float:
+    """Length of the records whose noise an exponential window weighed, s; 0 without one.
+
+    Where the window would correlate more lines than are stated, the noise came after it and is each line's own.
+    """
+    length_s = 1 / float(np.median(np.diff(frfs.frequency_hz)))
+    half = frfs.window_decay_1_s * length_s / 2
+    return length_s if half > 0.0 and half / np.tanh(half) < frfs.correlated_lines + 1 else 0.0
 
 
 def _decisions(fitted: FittedModes, modes: IntArray, unconfirmed: tuple[str, ...]) -> pd.DataFrame:
