@@ -72,6 +72,8 @@ class RecordInfo:
         Noise power of each response over that of the other impacts; empty where they cannot be compared.
     period : int
         Samples after which the force of a shaker comes again; 0 where it does not.
+    steady_part : int
+        The first of its parts of whole periods without a transient; -1 where transients have to be fitted.
     is_unlike : bool
         All its responses contradict those of the other impacts, and no fault of a recording explains it.
     """
@@ -106,6 +108,7 @@ class RecordInfo:
     lacks_most: bool = False
     noise_scales: tuple[float, ...] = ()
     period: int = 0
+    steady_part: int = -1
     is_unlike: bool = False
 
     @property
