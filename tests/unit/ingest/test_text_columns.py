@@ -11,6 +11,7 @@ import pytest
 
 from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
+from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.formats import text_table
 from frf_ipz.ingest.formats.text_layout import sniff
 from frf_ipz.ingest.recording_files import RecordingFiles
@@ -379,6 +380,14 @@ def test_a_time_in_us_is_brought_to_seconds(tmp_path, name):
 
 def in_us(number, fields):
     return ",".join([repr(1e6 * number / RATE_HZ), *fields[1:]])
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e6])
+def test_times_that_make_impacts_last_for_seconds_are_said_to_be_no_seconds(tmp_path, factor):
+    change = lines_with(lambda _, fields: ",".join([repr(factor * float(fields[0])), *fields[1:]]))
+    write(tmp_path, change)
+    (text,) = (text for text in estimate_frfs(read_test(write_test(tmp_path, HIT))).warnings if "impacts last" in text)
+    assert "seems not to be in seconds; name its unit in the column's header, as in 'time [ms]'" in text
 
 
 NAMES = {"cp932": "力[N]", "gb18030": "力锤", "cp1251": "Сила", "cp949": "힘", "mac_roman": "Kraft ü", "utf-8": "力[N]"}

@@ -90,7 +90,7 @@ def _check_file(files: RecordingFiles, index: FileIndex) -> RecordInfo:
 
 
 def _whole_periods(period: int) -> int:
-    """Samples of the shortest part of whole periods that is long enough."""
+    """Count the samples of the shortest part of whole periods that is long enough."""
     return -(-SHORTEST // period) * period
 
 
