@@ -65,7 +65,7 @@ NOT_STATED = {"", "-", "--", "?", "none", "null", "n/a", "unknown", "no unit", "
 
 # What stands in files, and what pint reads. The second line: UTF-8 taken for Latin-1, and the code page of DOS.
 LETTERS = str.maketrans({"µ": "u", "μ": "u", "·": "*", "⋅": "*", "∙": "*", "•": "*", "×": "*", "−": "-", "°": "deg"})
-MANGLED = (("Â²", "²"), ("Â³", "³"), ("Âµ", "µ"), ("Â·", "·"), ("ý", "²"), ("æ", "µ"), ("^", "**"))
+MANGLED = (("Â²", "²"), ("Â³", "³"), ("Âµ", "µ"), ("Â·", "·"), ("ý", "²"), ("æ", "µ"), ("^", "**"), ("g's", "g"))
 SUPERSCRIPTS = re.compile(r"[⁻⁺]?[¹²³⁴]")
 DIGITS_OF_SUPERSCRIPTS = str.maketrans("⁻⁺¹²³⁴", "-+1234")
 LENGTH_PER_TIME = re.compile(r"(?<![A-Za-z])([kmcdun]?m|in|ft)s(?:\*\*)?(-[12])(?![0-9])")  # ms-2 is m s-2
@@ -87,8 +87,8 @@ WORDS_IN_ANY_CASE = {
     **dict.fromkeys(("lb", "lbs", "lbf", "lbsf", "pound", "pounds"), "lbf"),
     **dict.fromkeys(("volt", "volts"), "V"),
     **dict.fromkeys(("sec", "secs", "second", "seconds", "sek"), "s"),
-    **dict.fromkeys(("msec", "msecs", "millisecond", "milliseconds"), "ms"),
-    **dict.fromkeys(("usec", "microsecond", "microseconds"), "us"),
+    **dict.fromkeys(("msec", "msecs", "millis", "millisecond", "milliseconds"), "ms"),
+    **dict.fromkeys(("usec", "micros", "microsecond", "microseconds"), "us"),
     **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
     **dict.fromkeys(("inch", "inches"), "inch"),
     **dict.fromkeys(("mil", "mils", "thou"), "(1e-3*inch)"),

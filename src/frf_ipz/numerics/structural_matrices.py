@@ -100,9 +100,10 @@ def select_free_rows(mass: Matrix, stiffness: Matrix, dofs: Sequence[Dof], *, he
         names = [dofs[row].name for row in np.flatnonzero(rows).tolist()]
         if names:
             shown = ", ".join(names[:DOFS_SHOWN]) + (", ..." if len(names) > DOFS_SHOWN else "")
+            rows_are = "1 row is" if len(names) == 1 else f"{len(names)} rows are"
+            held_are = "this DOF is held, and" if len(names) == 1 else "these DOFs are held, and"
             notes.append(
-                f"{len(names)} rows are {ways} ({shown}): these DOFs are held, and left out; [matrices] held = 'keep' "
-                "takes the rows as they are"
+                f"{rows_are} {ways} ({shown}): {held_are} left out; [matrices] held = 'keep' takes the rows as they are"
             )
     free = np.flatnonzero(~marks.any)
     return FreeRows(

@@ -218,3 +218,13 @@ def test_the_plate_of_full_matrices_is_drawn_as_a_grid(practice):
     geometry = read_model(practice / "case_14" / "model.toml").geometry
     assert len(geometry.nodes) == 42
     assert len(geometry.lines) == 71  # 7 x 6 nodes: 36 + 35
+
+
+def test_coordinates_without_a_unit_are_said_to_be_taken_for_metres(tmp_path):
+    path = export(tmp_path, beam())
+    table = tmp_path / "dofs.csv"
+    table.write_text(table.read_text(encoding="utf-8").replace("x_m,y_m,z_m", "x,y,z"), encoding="utf-8")
+    (note,) = (note for note in read_model(path).notes if "metres" in note)
+    assert "the structure is 0.4995 m long; call the columns x_m, y_m, z_m where that is right" in note
+    path.write_text(path.read_text(encoding="utf-8").replace("[model]", '[model]\nunits = "mm-t-s"'), encoding="utf-8")
+    assert not any("metres" in note for note in read_model(path).notes)

@@ -123,7 +123,7 @@ def test_lost_samples_are_found_where_four_impacts_hardly_tell_that_one_is_wrong
     [
         (reverse_one, "acc_1 contradicts the other impacts: its sign is the opposite"),
         (double, "acc_1 contradicts the other impacts: it is 2 times as large"),
-        (kill, "acc_1 contradicts the other impacts"),
+        (kill, "acc_1 is dead: nothing in it follows the force"),
         (flatten, "acc_1 is dead: all its samples are 0.25"),
         (overload, "overload of acc_1"),
         (settle, "acc_1 is settling"),
@@ -149,6 +149,24 @@ def test_a_channel_that_is_bad_in_all_impacts_has_no_frf(tmp_path, change, reaso
     assert any(
         text.startswith("there is no FRF 1:+z / 7:+z: in all impacts") and reason in text for text in result.warnings
     )
+
+
+@pytest.mark.parametrize(("impacts", "bad"), [(5, (0, 2, 4)), (5, (1, 2, 3, 4)), (3, (0, 1)), (2, (0,))])
+def test_impacts_in_which_a_sensor_is_unplugged_are_no_majority(tmp_path, impacts, bad):
+    result = estimate(tmp_path, kill, impacts=impacts, bad=bad)
+    assert result.records.used.all()
+    for number, marks in enumerate(result.records.marks):
+        assert ("acc_1 is dead: nothing in it follows the force" in marks) == (number in bad)
+    assert list(result.frfs.averages) == [impacts - len(bad), impacts]
+    assert truth_error(result).max() < 0.01
+
+
+def test_a_weak_impact_below_the_noise_is_not_dead(tmp_path):
+    def weaken(signals):
+        noise = signals - impact(Structure(), height=HEIGHTS[2])
+        return 0.002 * (signals - noise) + noise
+
+    assert not any("is dead" in marks for marks in estimate(tmp_path, weaken).records.marks)
 
 
 def test_the_majority_decides(tmp_path):

@@ -515,3 +515,26 @@ def test_a_unit_that_is_not_the_headers_is_said(tmp_path):
     result = read(tmp_path, entry("frf.txt", unit="m/s^2/N", **STATED))
     np.testing.assert_allclose(result.frfs.values[:, 0], VALUES[:, 0], rtol=DIGITS)
     assert any("in 'm/s^2/N', as its [[frf]] says, where its header says 'g/N'" in text for text in result.warnings)
+
+
+@pytest.mark.parametrize("unit", ["V/V", "EU/EU", "V", "mV/N"])
+@pytest.mark.parametrize("keys", [{}, {"columns": ("frequency_hz", "real", "imag")}], ids=["header", "columns stated"])
+def test_values_in_a_unit_of_no_motion_over_force_are_refused(tmp_path, unit, keys):
+    analyser_text(tmp_path, (f"Real [{unit}]", f"Imag [{unit}]"), *parts())
+    text = message(tmp_path, entry("frf.txt", **STATED, **keys))
+    assert re.search(rf"frf\.txt: .*'{unit}', which is no unit of accelerance; write.*'unit' of its \[\[frf\]\]", text)
+
+
+@pytest.mark.parametrize("skip_rows", [0, 1])
+def test_units_of_a_header_hold_where_columns_are_stated(tmp_path, skip_rows):
+    analyser_text(tmp_path, ("Real [mm/s2/N]", "Imag [mm/s2/N]"), *parts(1e3))
+    columns = ("frequency_hz", "real", "imag")
+    result = read(tmp_path, entry("frf.txt", columns=columns, skip_rows=skip_rows, **STATED))
+    np.testing.assert_allclose(result.frfs.values[:, 0], VALUES[:, 0], rtol=DIGITS)
+
+
+def test_a_row_of_units_that_are_none_of_the_quantity_is_refused(tmp_path):
+    rows = np.column_stack([LINES_HZ, *parts()])
+    header = "Frequency\tReal\tImaginary\nHz\tV/V\tV/V"
+    np.savetxt(tmp_path / "frf.txt", rows, fmt="%.16e", delimiter="\t", header=header, comments="", encoding="utf-8")
+    assert "'V/V', which is no unit of accelerance" in message(tmp_path, entry("frf.txt", **STATED))

@@ -11,6 +11,7 @@ import pytest
 
 from frf_ipz.errors import InputError
 from frf_ipz.ingest.campaign_file import read_test
+from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.formats import text_table
 from frf_ipz.ingest.formats.text_layout import sniff
 from frf_ipz.ingest.recording_files import RecordingFiles
@@ -94,7 +95,7 @@ def test_a_first_column_that_grows_evenly_is_the_time(tmp_path, name):
     expect(read(write(tmp_path, named(name))))
 
 
-@pytest.mark.parametrize("name", ["Time (ms)", "time_ms", "Zeit/ms", "t [ms]", "Time ms", "milliseconds"])
+@pytest.mark.parametrize("name", ["Time (ms)", "time_ms", "Zeit/ms", "t [ms]", "Time ms", "milliseconds", "millis"])
 def test_a_time_in_ms_is_brought_to_seconds(tmp_path, name):
     change = lines_with(lambda _, fields: ",".join([repr(1e3 * float(fields[0])), *fields[1:]]))
     expect(read(write(tmp_path, lambda text: named(name)(change(text)))))
@@ -370,3 +371,38 @@ def test_a_time_without_a_unit_that_counts_by_one_counts_samples(tmp_path):
     expect(read(path, "sample_rate_hz = 2048.0"))
     in_ms = write(tmp_path, lambda text: named("time [ms]")(counts(text)))
     np.testing.assert_allclose(np.diff(read(in_ms)[:, 0]), 1e-3, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["micros", "Time (us)", "microseconds"])
+def test_a_time_in_us_is_brought_to_seconds(tmp_path, name):
+    expect(read(write(tmp_path, lambda text: named(name)(lines_with(in_us)(text)))))
+
+
+def in_us(number, fields):
+    return ",".join([repr(1e6 * number / RATE_HZ), *fields[1:]])
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e6])
+def test_times_that_make_impacts_last_for_seconds_are_said_to_be_no_seconds(tmp_path, factor):
+    change = lines_with(lambda _, fields: ",".join([repr(factor * float(fields[0])), *fields[1:]]))
+    write(tmp_path, change)
+    (text,) = (text for text in estimate_frfs(read_test(write_test(tmp_path, HIT))).warnings if "impacts last" in text)
+    assert "seems not to be in seconds; name its unit in the column's header, as in 'time [ms]'" in text
+
+
+NAMES = {"cp932": "力[N]", "gb18030": "力锤", "cp1251": "Сила", "cp949": "힘", "mac_roman": "Kraft ü", "utf-8": "力[N]"}
+
+
+@pytest.mark.parametrize("encoding", NAMES)
+def test_names_are_found_in_the_encoding_of_the_file(tmp_path, encoding):
+    path = write(tmp_path, lambda text: text.replace("force", NAMES[encoding], 1).encode(encoding))
+    test_path = write_test(tmp_path, HIT)
+    text = test_path.read_text(encoding="utf-8").replace('column = "force"', f'column = "{NAMES[encoding]}"')
+    test_path.write_text(text, encoding="utf-8")
+    test = read_test(test_path)
+    expect(np.concatenate(list(RecordingFiles(test=test).blocks(test.setups[0], path))))
+
+
+def test_names_in_another_encoding_that_are_not_there_are_said_to_be_such(tmp_path):
+    path = write(tmp_path, lambda text: text.replace("force", "力[N]", 1).encode("cp932"))
+    assert "its names are not in UTF-8; save it as UTF-8, or write the number of the column" in message(path)

@@ -22,6 +22,7 @@ from frf_ipz.numerics.structural_matrices import MatrixOptions, ModelMatrices
 from frf_ipz.option_types import Name
 from frf_ipz.structure import Part, StructuralModel, drawn_geometry
 from frf_ipz.toml_files import STRICT
+from frf_ipz.unit_systems import SI
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -216,7 +217,11 @@ def read(file: MatricesFile, path: Path) -> StructuralModel:
         modal_damping=modal_damping,
         damping_all=sparse.csr_array(damping + model.damping),
         parts=_groups(files, matrices),
-        notes=(*(note for what in ("mass", "stiffness", "damping") for note in files.notes(what)), *model.notes),
+        notes=(
+            *(note for what in ("mass", "stiffness", "damping") for note in files.notes(what)),
+            *(_about_metres(positions) if files.takes_metres and not is_schematic and file.model.units == SI else ()),
+            *model.notes,
+        ),
         source=file,
     )
 
@@ -233,6 +238,7 @@ class _Files:
     positions: Mapping[int, Sequence[float]]
     whole: Mapping[str, StoredMatrix]
     mesh: Mesh | None
+    takes_metres: bool
 
     @classmethod
     def read(cls, path: Path, options: MatricesOptions, names: Mapping[str, str], unit_m: float) -> _Files:
@@ -263,9 +269,10 @@ class _Files:
             positions = {node: (scale * x, scale * y, scale * z) for node, (x, y, z) in stored_mesh.positions.items()}
             mesh = stored_mesh.drawn(unit_m)
         axes = {} if table is None else table.axes
+        takes_metres = table is not None and table.without_unit and mesh is None
         return cls(
             path=path, options=options, dofs=dofs, ordered_by=ordered_by, axes=axes, positions=positions, whole=whole,
-            mesh=mesh,
+            mesh=mesh, takes_metres=takes_metres,
         )  # fmt: skip
 
     def notes(self, what: str) -> tuple[str, ...]:
@@ -306,6 +313,15 @@ def _read_one(
     variable = "" if is_part or options.variables is None else getattr(options.variables, what)
     request = MatrixRequest(path=path.parent / name, what=what, variable=variable, order=order, ordered_by=ordered_by)
     return read_matrix(request)
+
+
+def _about_metres(positions: FloatArray) -> tuple[str, ...]:
+    """Say what coordinates without a unit are taken for, and how large the structure is then."""
+    size_m = float(np.ptp(positions, axis=0).max(initial=0.0))
+    if size_m == 0.0:
+        return ()
+    taken = f"coordinates under x, y, z are taken for metres: the structure is {size_m:.4g} m long"
+    return (f"{taken}; call the columns x_m, y_m, z_m where that is right, else bring them to metres",)
 
 
 def _groups(files: _Files, matrices: ModelMatrices) -> tuple[Part, ...]:

@@ -44,12 +44,15 @@ class DofTable:
         Nodes with axes of their own, which are the rows of the array.
     choices : tuple of DofTable
         Selections of the rows, where matrices may have one of several.
+    without_unit : bool
+        Positions stand under x, y, z, which say no unit.
     """
 
     dofs: tuple[Dof, ...]
     positions: Mapping[int, Sequence[float]]
     axes: Mapping[int, FloatArray]
     choices: tuple[DofTable, ...] = ()
+    without_unit: bool = False
 
     def of_order(self, order: int) -> DofTable:
         """Choose the selection of rows that a matrix has.
@@ -117,7 +120,8 @@ def read_dof_table(path: Path) -> DofTable:
             raise FileFormatError(path, f"node {dof.node} has other coordinates in an earlier line", where=where)
     if not lines:
         raise FileFormatError(path, "names no DOF; one row a row of the matrices is needed")
-    return DofTable(dofs=tuple(lines), positions=positions, axes=axes)
+    without_unit = bool(PLAIN.keys() & {name.strip().lower() for name in header})
+    return DofTable(dofs=tuple(lines), positions=positions, axes=axes, without_unit=without_unit)
 
 
 def _csv_rows(lines: list[str], separator: str, path: Path) -> Iterator[tuple[int, list[str]]]:

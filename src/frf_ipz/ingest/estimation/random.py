@@ -8,6 +8,7 @@ import numpy as np
 
 from frf_ipz.ingest.estimation.averaging import average_recordings
 from frf_ipz.ingest.estimation.several_inputs import estimate_random_several
+from frf_ipz.ingest.signals.periods import transform_parts
 from frf_ipz.ingest.signals.transients import transform_subrecords
 from frf_ipz.ingest.signals.windows import count_independent_segments, cut_segments
 
@@ -53,11 +54,10 @@ def estimate_random(files: RecordingFiles, options: IngestOptions, progress: Pro
 
 def _add_record(average: SetupAverage, info: RecordInfo, record: Record, survey: Survey) -> float:
     """Add a record to the average of its set-up, and return the energy of its force."""
-    del info
     rows = list(record.outputs)
     before = int(average.sums.counts[rows[0]])
     if survey.subrecord_length:
-        energy = _add_subrecords(average, record, survey.subrecord_length)
+        energy = _add_subrecords(average, info, record, survey.subrecord_length)
     else:
         energy = 0.0
         for signals in _window_record(record, survey):
@@ -68,8 +68,14 @@ def _add_record(average: SetupAverage, info: RecordInfo, record: Record, survey:
     return energy
 
 
-def _add_subrecords(average: SetupAverage, record: Record, length: int) -> float:
-    for force, responses in transform_subrecords(record.force, record.responses, length):
+def _add_subrecords(average: SetupAverage, info: RecordInfo, record: Record, length: int) -> float:
+    is_steady = info.steady_part >= 0 and length % info.period == 0
+    parts = (
+        transform_parts(record.force, record.responses, length, info.steady_part)
+        if is_steady
+        else transform_subrecords(record.force, record.responses, length)
+    )
+    for force, responses in parts:
         average.sums.add_spectra(force, responses, list(record.outputs))
     return float(np.sum(record.force[: len(record.force) // length * length] ** 2))
 

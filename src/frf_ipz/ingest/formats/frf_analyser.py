@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.errors import FileFormatError, QuantityError
+from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats import frf_text
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf
 from frf_ipz.ingest.formats.text_layout import is_number, name_and_unit, sniff
-from frf_ipz.ingest.units import frf_factor
-from frf_ipz.quantities import FrfQuantity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
     from pathlib import Path
 
     from frf_ipz.arrays import ComplexArray
@@ -38,7 +35,6 @@ PHASES = {"real", "imag", "phase_deg", "phase_rad"}
 LABELS = ("output_dof", "input_dof")
 DEGREES = re.compile(r"deg|°|º", re.IGNORECASE)
 LEAST_SPAN = 2.0 * np.pi  # degrees: within it phases without a unit may be radians
-RATIO = re.compile(r"\(([^()]+)\)\s*\(([^()]+)\)")  # SignalCalc writes (m/s²)(N) for a ratio
 MOST_HEAD = 1 << 12  # bytes in which a binary file shows itself
 
 
@@ -50,20 +46,14 @@ class AnalyserColumns:
     ----------
     columns : tuple of str
         As `columns` of ``[[frf]]`` says it.
-    unit : str
-        Of the values; may be empty.
-    quantity : FrfQuantity, optional
-        What has that unit, or its reciprocal.
-    is_reciprocal : bool
-        It is a unit of force over response.
+    unit : HeaderUnit
+        Of the values.
     phase : str
         The name of the column of phases where it states neither degrees nor radians.
     """
 
     columns: tuple[str, ...]
-    unit: str = ""
-    quantity: FrfQuantity | None = None
-    is_reciprocal: bool = False
+    unit: frf_text.HeaderUnit
     phase: str = ""
 
 
@@ -82,21 +72,14 @@ class _AnalyserText:
             raise FileFormatError(
                 source.path, "does not say what its columns are; write columns = [...] in its [[frf]]"
             )
-        is_meant = found.quantity is source.quantity and found.is_reciprocal == source.is_reciprocal
-        if found.unit and not is_meant and not source.unit:
-            what = "force over response" if found.is_reciprocal or found.quantity is None else found.quantity.value
-            problem = (
-                f"its header gives values in '{found.unit}', which is {what}; correct the 'quantity' of its [[frf]]"
-            )
-            raise FileFormatError(source.path, f"{problem}, or write their right 'unit' there")
         frfs = frf_text.FORMAT.read(replace(source, columns=found.columns))
         if found.phase:
             _require_degrees(source.path, found, frfs[0].values)
         about = f"{source.path.name}: its columns are {', '.join(found.columns)}"
-        if found.unit and source.unit and found.unit != source.unit:
-            about += f"; in '{source.unit}', as its [[frf]] says, where its header says '{found.unit}'"
-        unit = found.unit if is_meant else ""
-        return tuple(replace(frf, source=source, unit=unit, notes=(*frf.notes, about)) for frf in frfs)
+        unit = found.unit.text
+        if unit and source.unit and unit != source.unit:
+            about += f"; in '{source.unit}', as its [[frf]] says, where its header says '{unit}'"
+        return tuple(replace(frf, source=source, notes=(*frf.notes, about)) for frf in frfs)
 
     def look(self, source: FrfSource) -> FrfContents:
         found = find_frf_columns(source)
@@ -106,8 +89,9 @@ class _AnalyserText:
                 source.path, "does not say what its columns are; write columns = [...] in its [[frf]]"
             )
         about = f"columns {', '.join(found.columns)}"
-        quantity = None if found.is_reciprocal else found.quantity
-        return FrfContents(n_outputs=1, n_inputs=1, quantity=quantity, unit=found.unit, about=about)
+        quantity = None if found.unit.is_reciprocal else found.unit.quantity
+        unit = "" if found.unit.quantity is None else found.unit.text
+        return FrfContents(n_outputs=1, n_inputs=1, quantity=quantity, unit=unit, about=about)
 
 
 FORMAT = _AnalyserText()
@@ -144,18 +128,12 @@ def find_frf_columns(source: FrfSource) -> AnalyserColumns | None:
             and roles[0] == frf_text.STATED
             and len(set(named)) == len(named)
         ):
-            unit, quantity, is_reciprocal = _unit_of(layout, words)
             phase = next((word for word in words if _role(word) == "phase_deg" and not DEGREES.search(word)), "")
             if phase and any(map(DEGREES.search, (field for row in layout.header for field in row))):
                 phase = ""  # a row of units says it
             frequency = frf_text.name_of_frequency(frf_text.stated_frequency_unit(layout, 0))
-            return AnalyserColumns(
-                columns=(frequency, *roles[1:]),
-                unit=unit,
-                quantity=quantity,
-                is_reciprocal=is_reciprocal,
-                phase=phase,
-            )
+            unit = frf_text.unit_of_values(layout.header, roles)
+            return AnalyserColumns(columns=(frequency, *roles[1:]), unit=unit, phase=phase)
     return None
 
 
@@ -213,18 +191,3 @@ def _require_degrees(path: Path, found: AnalyserColumns, values: ComplexArray) -
         )
         way_out = f"write columns = [{columns}] in its [[frf]], or phase_rad there"
         raise FileFormatError(path, f"{problem}, and nothing says whether these are degrees or radians; {way_out}")
-
-
-def _unit_of(layout: TextLayout, words: Sequence[str]) -> tuple[str, FrfQuantity | None, bool]:
-    """Find the text of the header that is a unit of FRFs or of their reciprocals, and of which."""
-    fields = [field for row in layout.header for field in row]
-    for text in (*(name_and_unit(word)[1] for word in words), *fields):
-        ratio = RATIO.fullmatch(text.strip())
-        for unit in (text, f"({ratio[1]})/({ratio[2]})") if ratio else (text,):
-            for quantity, is_reciprocal in product(FrfQuantity if unit.strip() else (), (False, True)):
-                try:
-                    frf_factor(f"1/({unit})" if is_reciprocal else unit, quantity, "z", "z")
-                except QuantityError:
-                    continue
-                return unit, quantity, is_reciprocal
-    return "", None, False

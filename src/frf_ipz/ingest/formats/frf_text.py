@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, complex_array
-from frf_ipz.errors import FileFormatError, did_you_mean
+from frf_ipz.errors import FileFormatError, QuantityError, did_you_mean
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import COMMENT, NEWLINE, TextLayout, decode, name_and_unit, open_text, sniff
 from frf_ipz.ingest.formats.text_table import not_a_number, read_blocks, require_once
-from frf_ipz.ingest.units import frequency_factor, is_frequency_unit
+from frf_ipz.ingest.units import frequency_factor, frf_factor, is_frequency_unit, is_stated, is_unit
 from frf_ipz.late_imports import import_late
+from frf_ipz.quantities import FrfQuantity
 from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pyarrow as pa
 else:
     pa = import_late("pyarrow")
@@ -37,6 +42,28 @@ KNOWN = (
     "variance",
     SKIP,
 )
+LINEAR = {"real", "imag", "magnitude"}  # columns whose values have the unit of the FRF
+RATIO = re.compile(r"\(([^()]+)\)\s*\(([^()]+)\)")  # SignalCalc writes (m/s²)(N) for a ratio
+ENGINEERING = "eu"  # the unit of an analyser that was told none
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeaderUnit:
+    """Unit that a header states for values.
+
+    Parameters
+    ----------
+    text : str
+        As the header writes it; empty where it states none.
+    quantity : FrfQuantity, optional
+        What has that unit, or its reciprocal; None for a unit of neither, such as ``V/V``.
+    is_reciprocal : bool
+        It is a unit of force over response.
+    """
+
+    text: str = ""
+    quantity: FrfQuantity | None = None
+    is_reciprocal: bool = False
 
 
 class _TextColumns:
@@ -48,7 +75,8 @@ class _TextColumns:
 
     def read(self, source: FrfSource) -> tuple[MeasuredFrf, ...]:
         _check_columns(source)
-        columns = _read_columns(source)
+        columns, header_unit = _read_columns(source)
+        unit = _unit_as_meant(source, header_unit)
         if source.output_dof is None or source.input_dof is None:
             raise FileFormatError(source.path, "holds one FRF: its [[frf]] needs 'output_dof' and 'input_dof'")
         if (columns.get("magnitude", np.zeros(0)) < 0.0).any():
@@ -67,6 +95,7 @@ class _TextColumns:
                 values=_complex_values(columns),
                 coherence=columns.get("coherence"),
                 variance=columns.get("variance"),
+                unit=unit,
                 notes=note_at_rest(source, source.output_dof, source.input_dof, left_out),
             ),
         )
@@ -95,7 +124,7 @@ def _check_columns(source: FrfSource) -> None:
         )
 
 
-def _read_columns(source: FrfSource) -> dict[str, FloatArray]:
+def _read_columns(source: FrfSource) -> tuple[dict[str, FloatArray], HeaderUnit]:
     layout = sniff(source.path, skip_rows=source.skip_rows)
     if layout.n_columns < len(source.columns):
         problem = f"has {counted(layout.n_columns, 'column')}, but 'columns' of its [[frf]] names {len(source.columns)}"
@@ -111,7 +140,65 @@ def _read_columns(source: FrfSource) -> dict[str, FloatArray]:
     if is_bad.any():
         raise not_a_number(layout, names, indices, int(np.argmax(is_bad)))
     require_once(layout, name, frequency, np.arange(len(frequency)), "its FRF")
-    return {"frequency_hz": frequency * _frequency_factor(layout, name, names.index(name)), **columns}
+    frequency_hz = frequency * _frequency_factor(layout, name, names.index(name))
+    return {"frequency_hz": frequency_hz, **columns}, unit_of_values(_head_rows(layout), names)
+
+
+def _unit_as_meant(source: FrfSource, stated: HeaderUnit) -> str:
+    """Give the unit of the values as their header states it; it must be one of what they are said to be."""
+    if not stated.text or source.unit:
+        return stated.text
+    if stated.quantity is None:
+        problem = f"its header gives values in '{stated.text}', which is no unit of {source.quantity.value}"
+        raise FileFormatError(source.path, f"{problem}; write what they are in as 'unit' of its [[frf]]")
+    if (stated.quantity, stated.is_reciprocal) != (source.quantity, source.is_reciprocal):
+        what = "force over response" if stated.is_reciprocal else stated.quantity.value
+        problem = f"its header gives values in '{stated.text}', which is {what}; correct the 'quantity' of its [[frf]]"
+        raise FileFormatError(source.path, f"{problem}, or write their right 'unit' there")
+    return stated.text
+
+
+def unit_of_values(rows: Sequence[Sequence[str]], names: Sequence[str]) -> HeaderUnit:
+    """Find the unit of the values in a header.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of str
+        Fields of its lines.
+    names : sequence of str
+        What the columns are, as `columns` says it.
+
+    Returns
+    -------
+    HeaderUnit
+        A unit of FRFs or of their reciprocals wherever one stands; else what stands for a unit of real parts,
+        imaginary parts or magnitudes.
+    """
+    fields = [field for row in rows for field in row]
+    for text in (*(name_and_unit(field)[1] for field in fields), *fields):
+        ratio = RATIO.fullmatch(text.strip())
+        for unit in (text, f"({ratio[1]})/({ratio[2]})") if ratio else (text,):
+            for quantity, is_reciprocal in product(FrfQuantity if unit.strip() else (), (False, True)):
+                try:
+                    frf_factor(f"1/({unit})" if is_reciprocal else unit, quantity, "z", "z")
+                except QuantityError:
+                    continue
+                return HeaderUnit(text=unit, quantity=quantity, is_reciprocal=is_reciprocal)
+    of_values = [row[index] for row in rows if len(row) == len(names) for index in _linear(names)]
+    return HeaderUnit(text=next((unit for field in of_values if (unit := _claimed_unit(field))), ""))
+
+
+def _linear(names: Sequence[str]) -> list[int]:
+    return [index for index, name in enumerate(names) if name in LINEAR]
+
+
+def _claimed_unit(field: str) -> str:
+    """Give what a field of a header claims to be a unit, in brackets or alone; empty where it is none."""
+    unit = name_and_unit(field)[1]
+    if is_stated(unit) and ("/" in unit or is_unit(unit)):
+        return unit
+    is_claimed = all(is_unit(part) or part.strip().lower() == ENGINEERING for part in field.split("/"))
+    return field if is_claimed else ""
 
 
 def _frequency_factor(layout: TextLayout, name: str, index: int) -> float:

@@ -6,7 +6,7 @@ The one answer to this for `init`, `check` and `run`.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,15 +31,20 @@ LETTERS_SHOWN, NAMES_SHOWN = 40, 10  # of names of columns, in a message
 FEWEST_ROWS = 3  # two steps can be compared
 TIME = re.compile(
     r"^(elapsed|relative|abs(olute)?)?[ _]*(t|time|zeit|temps|tempo|tiempo|tid|tijd|x[ _-]?value|x[ _-]?axis|"
-    r"seconds?|secs?|timestamp|zeitstempel|date ?time|milliseconds?|microseconds?)(?![a-z])",
+    r"seconds?|secs?|timestamp|zeitstempel|date ?time|milliseconds?|microseconds?|millis|micros)(?![a-z])",
     re.IGNORECASE,
 )
 TIME_UNIT = re.compile(
-    r"(?:^|[ _/.,])(s|sec|secs|seconds?|ms|msec|milliseconds?|us|µs|microseconds?|ns|min|h|hours?|d|days?)$",
+    r"(?:^|[ _/.,])(s|sec|secs|seconds?|ms|msec|millis|milliseconds?|us|µs|micros|microseconds?|ns|min|h|hours?|d|"
+    r"days?)$",
     re.IGNORECASE,
 )
 FREQUENCY = re.compile(r"freq|frequenz|\bhz\b", re.IGNORECASE)
 PRINTED = re.compile(r"[-+]?[0-9]*(?:[.,]([0-9]*))?(?:[eEdD]([-+]?[0-9]{1,3}))?")
+ENCODINGS = (  # of names that are not in UTF-8, beside Latin-1: of Windows, of DOS, of Macs
+    *("cp1252", "cp932", "gb18030", "cp950", "cp949", "euc_jp", "cp1250", "cp1251", "cp1253", "cp1254", "cp1255"),
+    *("cp437", "cp850", "cp852", "cp866", "koi8_r", "mac_roman"),
+)
 REMARK = re.compile(r"comments?|kommentare?|remarks?", re.IGNORECASE)
 
 
@@ -88,6 +93,7 @@ def find_columns(layout: TextLayout, keys: TableKeys, *, columns: Sequence[str] 
     FileFormatError
         If the header does not fit the numbers, or the column of the time is not there.
     """
+    layout = _in_encoding_of(layout, columns)
     names, units = _read_header(layout, keys.header_row, columns)
     taken = {index for index, name in enumerate(names) if name in columns or name_and_unit(name)[0] in columns}
     counts_samples = _counts_samples(layout, names, units, 0) and 0 not in taken
@@ -205,6 +211,26 @@ def unwrap_days(seconds: FloatArray, last: float) -> FloatArray:
     return np.asarray(first + np.cumsum(steps - DAY_S * np.rint(steps / DAY_S)))
 
 
+def _in_encoding_of(layout: TextLayout, columns: Sequence[str]) -> TextLayout:
+    """Read names in the encoding in which those that the test writes stand there; as they were where none is that."""
+    if not columns or any(_holds(fields, columns) for fields in layout.header):
+        return layout
+    for encoding in ENCODINGS:
+        try:
+            header = tuple(
+                tuple(field.encode("latin-1").decode(encoding) for field in fields) for fields in layout.header
+            )
+        except UnicodeError:
+            continue
+        if any(_holds(fields, columns) for fields in header):
+            return replace(layout, header=header)
+    return layout
+
+
+def _holds(fields: Sequence[str], columns: Sequence[str]) -> bool:
+    return set(columns) <= {*fields, *(name_and_unit(field)[0] for field in fields)}
+
+
 def _read_header(layout: TextLayout, header_row: int | None, columns: Sequence[str]) -> tuple[list[str], list[str]]:
     """Give the name and the unit of each column."""
     rows = [_match_width(layout, fields) for fields in layout.header]
@@ -239,8 +265,7 @@ def _header_position(
             raise _wrong_width(layout, layout.header[position])
         return position
     wide = [position for position, row in enumerate(rows) if row is not None]
-    bare = {position: {name_and_unit(name)[0] for name in rows[position] or ()} for position in wide}
-    holding = [position for position in wide if set(columns) <= bare[position] | set(rows[position] or ())]
+    holding = [position for position in wide if _holds(rows[position] or (), columns)]
     if columns and holding:
         return holding[-1]
     if not wide:

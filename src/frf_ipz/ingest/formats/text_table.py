@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 import weakref
 from contextlib import contextmanager
@@ -29,6 +30,7 @@ else:
     pa = import_late("pyarrow")
     arrow_csv = import_late("pyarrow.csv")
 
+CONTROL = re.compile("[\x80-\x9f]")  # in no name: bytes of another encoding that were taken for Latin-1
 BLOCK_BYTES = 1 << 22
 LINES_AT_ONCE = 10_000
 LET_GO_S, PAUSE_S = 1.0, 1e-4  # at most, for threads of pyarrow to drop what they have read; between two looks
@@ -64,6 +66,9 @@ def column_index(layout: TextLayout, names: Sequence[str], column: str) -> int:
     if not indices:
         known = [name for name in names if name]
         where = f"line {max(layout.n_before, 1)}"
+        if CONTROL.search("".join(known)):
+            problem = f"has no column '{column}', and its names are not in UTF-8; save it as UTF-8, or write the number"
+            raise FileFormatError(layout.path, f"{problem} of the column, as in column = 2", where=where)
         raise FileFormatError(layout.path, f"has no column '{column}'; {did_you_mean(column, known)}", where=where)
     if len(indices) > 1:
         raise FileFormatError(

@@ -1,4 +1,9 @@
-"""Periodic excitation: over a whole number of periods a transform has no leakage."""
+"""Periodic excitation: over a whole number of periods a transform has no leakage.
+
+That holds once the motion from before the record, or from its start at rest, has died out. The later half of the parts
+that a record is cut into gives an FRF and the noise of the responses; the first parts of which the FRF leaves more
+than that noise, about some line, hold such motion.
+"""
 
 from __future__ import annotations
 
@@ -9,15 +14,21 @@ import numpy as np
 from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
-    from scipy import fft
+    from collections.abc import Iterator
 
-    from frf_ipz.arrays import FloatArray
+    from scipy import fft, special
+
+    from frf_ipz.arrays import ComplexArray, FloatArray
 else:
     fft = import_late("scipy.fft")
+    special = import_late("scipy.special")
 
 DIFFERENT = 0.01  # of the mean square: the same force again differs by noise and by the shaker's own distortion
 CHANGED = 0.5  # of the mean square
 SHORTEST = 16  # samples
+FEWEST = 3  # parts without transients: their scatter is the noise
+SIDE = 8  # lines to each side that are judged together
+LEVEL = 1e-3  # probability that a part without a transient is taken for one with
 
 
 def find_period(force: FloatArray) -> int:
@@ -59,3 +70,85 @@ def find_period(force: FloatArray) -> int:
     period = int(lags[end])
     last = n_samples // 2 // period * period  # noise in a narrow band is alike after one cycle, and not after many
     return period if difference[last - SHORTEST] < DIFFERENT else 0
+
+
+def transform_parts(
+    force: FloatArray, responses: FloatArray, length: int, first: int = 0
+) -> Iterator[tuple[ComplexArray, ComplexArray]]:
+    """Transform the parts of a periodic record, each of whole periods.
+
+    Parameters
+    ----------
+    force : (n_samples,) array
+        N.
+    responses : (n_outputs, n_samples) array
+        SI.
+    length : int
+        Samples of a part; a shorter remainder at the end is not used.
+    first : int
+        The first part to give.
+
+    Yields
+    ------
+    force : (n_lines,) complex array
+        Transform of a part.
+    responses : (n_outputs, n_lines) complex array
+        Those of the responses.
+    """
+    for start in range(first * length, len(force) - length + 1, length):
+        samples = slice(start, start + length)
+        yield fft.rfft(force[samples]), fft.rfft(responses[:, samples])
+
+
+def first_steady_part(force: FloatArray, responses: FloatArray, length: int) -> int:
+    """Find the part of a periodic record from which on nothing but noise adds to the answer to its force.
+
+    Parameters
+    ----------
+    force : (n_samples,) array
+        N.
+    responses : (n_outputs, n_samples) array
+        SI.
+    length : int
+        Samples of a part.
+
+    Returns
+    -------
+    int
+        Its number, from 0; -1 where fewer than three parts are left: then transients have to be fitted.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> force = np.tile(rng.standard_normal(256), 8)
+    >>> noise = 0.01 * rng.standard_normal((1, 2048))
+    >>> settling = np.exp(-np.arange(2048) / 50)
+    >>> first_steady_part(force, force + noise, 256), first_steady_part(force, force + noise + settling, 256)
+    (0, 2)
+    """
+    n_parts = len(force) // length
+    n_later = max(n_parts // 2, 2)
+    if n_parts < FEWEST:
+        return -1
+    spectra = list(transform_parts(force, responses, length))
+    later = spectra[-n_later:]
+    power = np.sum([np.abs(F) ** 2 for F, _ in later], axis=0)
+    frf = np.sum([F.conj() * X for F, X in later], axis=0) / np.maximum(power, np.finfo(float).tiny)
+    noise = _smooth(np.sum([np.abs(X - frf * F) ** 2 for F, X in later], axis=0)) / (n_later - 1)
+    n_tried = n_parts * noise.size
+    first = 0
+    for number, (F, X) in enumerate(spectra[:-n_later]):
+        left = _smooth(np.abs(X - frf * F) ** 2 / (1.0 + np.abs(F) ** 2 / np.maximum(power, np.finfo(float).tiny)))
+        ratio = np.divide(left, noise, out=np.ones_like(left), where=noise > 0.0).max(initial=0.0)
+        degrees = 2 * (2 * SIDE + 1)
+        if special.fdtrc(degrees, degrees * (n_later - 1), ratio) < LEVEL / n_tried:
+            first = number + 2  # what has died out to below the noise has not ended: one more is left out
+    return first if n_parts - first >= FEWEST else -1
+
+
+def _smooth(power: FloatArray) -> FloatArray:
+    """Average over neighbouring lines without that at 0 Hz, where offsets drift; near the ends over those there are."""
+    sums = np.cumsum(np.pad(power[:, 1:], ((0, 0), (1, 0))), axis=1)
+    lines = np.arange(sums.shape[1] - 1)
+    start, stop = np.maximum(lines - SIDE, 0), np.minimum(lines + SIDE + 1, len(lines))
+    return np.asarray((sums[:, stop] - sums[:, start]) / (stop - start))

@@ -17,6 +17,7 @@ from frf_ipz.ingest.survey.contradictions import (
     compare_output,
     contradicts_pairwise,
     difference_of_pair,
+    find_dead,
     follows_force,
     leave_out,
     weigh_impacts,
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 CONTRADICTS = "contradicts the other impacts"
 OPPOSITE = "its sign is the opposite"
 UNNAMED = ""
+DEAD = "is dead: nothing in it follows the force"
 ADVICE = "which is right does not show in two: drop the wrong one by [ingest] drop, or record a third"
 DISAGREE = 0.12  # of the FRF, 1 dB: two impacts that differ by more are no repetition; what is explained to this, is
 LITTLE = 0.5  # of the usual weight: less is said
@@ -64,6 +66,8 @@ def compare_impacts(files: RecordingFiles, survey: Survey) -> tuple[tuple[Record
         if len(records) < 2:
             continue
         spectra = _transform(files, survey, records)
+        records, spectra = _without_dead(files, records, spectra)
+        changed |= {record.name: record for record in records}
         if len(records) == 2:
             compared, undecided = _compare_pair(files, survey, records, spectra)
             warnings += undecided
@@ -119,6 +123,21 @@ def _windowed(
             signals = record.correct(segment[1:])
             decay = survey.decay_1_s * record.step_s
             yield record, window_impact(signals, survey.n_samples, record.force_interval, decay, record.trigger)
+
+
+def _without_dead(
+    files: RecordingFiles, records: Sequence[RecordInfo], spectra: ImpactSpectra
+) -> tuple[list[RecordInfo], ImpactSpectra]:
+    """Mark responses that hold nothing in some of the impacts, and leave these out of what is compared."""
+    columns = [channel.column for channel in files.test.output_channels]
+    valid = spectra.valid.copy()
+    causes: list[dict[int, str]] = [{} for _ in records]
+    for output in range(len(columns)):
+        for impact in find_dead(spectra, output):
+            causes[impact][output] = DEAD
+            valid[impact, output] = False
+    marked = [_with_causes(record, named, columns) for record, named in zip(records, causes, strict=True)]
+    return marked, replace(spectra, valid=valid)
 
 
 def _compare_setup(
@@ -241,7 +260,7 @@ def _name_causes(
         if not spectra.valid[impact, output]:
             continue
         if not follows_force(spectra, output):
-            causes[output] = "is dead: nothing in it follows the force"
+            causes[output] = DEAD
         elif comparison is not None and impact in comparison.reversed_sign:
             causes[output] = f"{CONTRADICTS}: {OPPOSITE}"
         elif comparison is not None and impact in comparison.contradicting:

@@ -8,6 +8,9 @@ complex numbers, one from the impact and c - 1 from the c impacts that agree: it
 (1 + x / (c - 1))^(1 - c), an F distribution with 2 and 2 (c - 1) degrees of freedom. An impact with a probability above
 the level is added, and the next is tried.
 
+An impact in which a response does not stand out of its noise, though by the FRF of those in which it does it should,
+holds nothing of it (a plug that came loose) and is no part of a majority.
+
 A reversed sensor explains an impact if the other sign makes D as small as that of the others: the ratio of the
 densities of D with and without must exceed the number of explanations over the level.
 """
@@ -19,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.ingest.signals.scatter import ROUNDING, fit_noise_power
 from frf_ipz.ingest.survey.noise_weights import noise_weights
 
@@ -31,6 +34,7 @@ LEVEL = 1e-3  # probability that a test without faults loses anything
 FEWEST = 3  # impacts of which one can be told from the majority
 FEWEST_WEIGHED = 2  # impacts whose noise can be compared
 PASSES = 3  # of the weights
+STANDS_OUT = 2.0  # times the power of the noise, median over the lines: there is as much signal as noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -234,14 +238,49 @@ def follows_force(spectra: ImpactSpectra, output: int) -> bool:
     """
     impacts = np.flatnonzero(spectra.valid[:, output])
     noise = np.sqrt(spectra.noise[impacts, output])
-    stands_out = np.median(np.abs(spectra.responses[impacts, output]) ** 2, axis=1) > 2.0 * np.median(noise**2, axis=1)
-    if len(impacts) < FEWEST or not noise.all() or stands_out.any():
+    power = np.abs(spectra.responses[impacts, output]) ** 2
+    if len(impacts) < FEWEST or not noise.all() or _stands_out(power, noise**2).any():
         return True
-    force, response = spectra.force[impacts] / noise, spectra.responses[impacts, output] / noise
+    return _is_coherent(spectra.force[impacts] / noise, spectra.responses[impacts, output] / noise)
+
+
+def find_dead(spectra: ImpactSpectra, output: int) -> tuple[int, ...]:
+    """Find the impacts in which a response holds nothing, though it does in others and should in them.
+
+    Parameters
+    ----------
+    spectra : ImpactSpectra
+        All impacts.
+    output : int
+        Which response.
+
+    Returns
+    -------
+    tuple of int
+        Those in which it does not stand out of its noise, where the FRF of those in which it does demands that; none
+        where the latter do not agree.
+    """
+    impacts = np.flatnonzero(spectra.valid[:, output])
+    force, response, noise = spectra.force[impacts], spectra.responses[impacts, output], spectra.noise[impacts, output]
+    alive = _stands_out(np.abs(response) ** 2, noise)
+    if alive.all() or not alive.any() or (alive.sum() > 1 and not _is_coherent(force[alive], response[alive])):
+        return ()
+    power = np.sum(np.abs(force[alive]) ** 2, axis=0)
+    frf = np.sum(force[alive].conj() * response[alive], axis=0) / np.maximum(power, np.finfo(float).tiny)
+    is_dead = ~alive & _stands_out(np.abs(frf * force) ** 2, noise)
+    return tuple(int(impact) for impact in impacts[is_dead])
+
+
+def _stands_out(power: FloatArray, noise: FloatArray) -> BoolArray:
+    return np.asarray(np.median(power, axis=1) > STANDS_OUT * np.median(noise, axis=1))
+
+
+def _is_coherent(force: ComplexArray, response: ComplexArray) -> bool:
+    """Tell whether impacts have more coherence than chance gives at the level."""
     cross = np.abs(np.sum(force.conj() * response, axis=0)) ** 2
     product = np.sum(np.abs(force) ** 2, axis=0) * np.sum(np.abs(response) ** 2, axis=0)
     coherence = np.divide(cross, product, out=np.zeros_like(cross), where=product > 0.0)
-    statistic = (1 - len(impacts)) * np.log1p(-np.minimum(coherence, 1.0 - np.finfo(float).eps))
+    statistic = (1 - len(force)) * np.log1p(-np.minimum(coherence, 1.0 - np.finfo(float).eps))
     is_mean_high = np.mean(statistic) > 1.0 + np.sqrt(2.0 * np.log(1.0 / LEVEL) / len(statistic))
     return bool(is_mean_high or np.max(statistic) > np.log(len(statistic) / LEVEL))
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 UNSEEN = 1 / 3  # of the noise: adds a twentieth to its deviation
 REMAINDER = 3e-4  # share of the slowest mode that remains under an automatic window: below the noise of good records
 SAME_LENGTH = 0.01  # relative difference up to which recordings are taken as equally long
+LONGEST_PULSE_S = 0.3  # beyond hammers, and sand bags: pulses of 0.3 ms and more are longer where ms are taken for s
 LONG_BEFORE = 0.12  # of a recording before its impact: more is cut off, for it holds nothing but noise
 SHORT_BEFORE = 0.05  # of a recording: what stays before the impact then
 
@@ -108,7 +109,7 @@ def _plan(indices: Sequence[FileIndex], records: Sequence[RecordInfo], options: 
         n_samples=n_samples,
         decay_1_s=decay_1_s,
         choices=(*about_decay, *about_force, *about_lines),
-        warnings=(*selection.warnings, *_warn_of_truncation(used, decay_1_s)),
+        warnings=(*selection.warnings, *_warn_of_slow_pulses(used), *_warn_of_truncation(used, decay_1_s)),
     )
 
 
@@ -255,6 +256,15 @@ def _describe_correlation(decay: float) -> tuple[str, ...]:
     if step == 1:
         return ()
     return (f"the exponential window correlates the noise of neighbouring lines: one in {step} is independent",)
+
+
+def _warn_of_slow_pulses(used: Sequence[RecordInfo]) -> tuple[str, ...]:
+    """Warn of pulses that are longer than those of any hammer: their time is in another unit than seconds."""
+    pulse_s = float(np.median([record.pulse_s for record in used]))
+    if not pulse_s > LONGEST_PULSE_S:
+        return ()
+    text = f"impacts last {pulse_s:.3g} s, where those of hammers last milliseconds: the time of the recordings seems"
+    return (f"{text} not to be in seconds; name its unit in the column's header, as in 'time [ms]', or scale it",)
 
 
 def _warn_of_truncation(used: Sequence[RecordInfo], decay_1_s: float) -> tuple[str, ...]:

@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.errors import InputError
+from frf_ipz.ingest.signals.periods import first_steady_part
 from frf_ipz.ingest.signals.windows import correlated_lines
 from frf_ipz.ingest.survey.checks import check_record
 from frf_ipz.ingest.survey.file_index import index_file
 from frf_ipz.ingest.survey.record_info import Survey
 from frf_ipz.ingest.survey.selection import check_names, record_name, select_records
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -81,7 +83,15 @@ def survey_random(files: RecordingFiles, options: IngestOptions, progress: Progr
 def _check_file(files: RecordingFiles, index: FileIndex) -> RecordInfo:
     (signals,) = files.segments(index.setup, index.path, [(0, index.n_rows)])
     name = record_name(files.test, index.path, 1, 1)
-    return check_record(files.test, index, name, signals, starts_at_rest=_starts_at_rest(signals[1:]))
+    record = check_record(files.test, index, name, signals, starts_at_rest=_starts_at_rest(signals[1:]))
+    if not record.period:
+        return record
+    return replace(record, steady_part=first_steady_part(signals[1], signals[2:], _whole_periods(record.period)))
+
+
+def _whole_periods(period: int) -> int:
+    """Count the samples of the shortest part of whole periods that is long enough."""
+    return -(-SHORTEST // period) * period
 
 
 def _starts_at_rest(signals: FloatArray) -> bool:
@@ -106,9 +116,21 @@ def _use_subrecords(survey: Survey) -> Survey:
     """Cut records into whole periods, or into as few equal sub-records as their length and some scatter allow."""
     periods = {record.period for record in survey.used}
     if len(periods) == 1 and (period := periods.pop()) > 0:
-        length = -(-SHORTEST // period) * period
+        length = _whole_periods(period)
         text = f"the force comes again every {period * survey.step_s:.4g} s: parts of {length * survey.step_s:.4g} s"
-        return replace(survey, subrecord_length=length, n_samples=length, choices=(f"{text}, whole periods",))
+        about_start = tuple(
+            f"{record.name}: the first {counted(record.steady_part, 'part')} of {record.n_samples // length}, in which "
+            "motion from before or from the start dies out, left out"
+            for record in survey.used
+            if record.steady_part > 0
+        )
+        about_transients = tuple(
+            f"{record.name}: transients at both ends of its parts removed (local rational method)"
+            for record in survey.used
+            if record.steady_part < 0
+        )
+        choices = (f"{text}, whole periods", *about_start, *about_transients)
+        return replace(survey, subrecord_length=length, n_samples=length, choices=choices)
     shortest = min(record.n_samples for record in survey.used)
     fewest = min(Counter(record.setup for record in survey.used).values())
     count = max(-(-shortest // LONGEST), -(-FEWEST // fewest))

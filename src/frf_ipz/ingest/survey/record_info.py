@@ -84,6 +84,8 @@ class RecordInfo:
         Jumps in its responses that no band-limited motion makes, from `start`; they are taken off.
     period : int
         Samples after which the force of a shaker comes again; 0 where it does not.
+    steady_part : int
+        The first of its parts of whole periods without a transient; -1 where transients have to be fitted.
     is_unlike : bool
         All its responses contradict those of the other impacts, and no fault of a recording explains it.
     """
@@ -123,6 +125,7 @@ class RecordInfo:
     noise_scales: tuple[float, ...] = ()
     spikes: tuple[Spike, ...] = ()
     period: int = 0
+    steady_part: int = -1
     is_unlike: bool = False
 
     @property
