@@ -385,8 +385,10 @@ def _record(rng: np.random.Generator, system: _System) -> list[tuple[int, FloatA
             signals = grid.signal(spectra.T) / units[:, None]
             for channel, signal in enumerate(signals):
                 full_scale = float(RANGES[np.searchsorted(RANGES, 1.1 * np.abs(signal).max())])
-                hum = np.sin(2 * np.pi * hum_hz * time + rng.uniform(0, 2 * np.pi))
-                hum += 0.3 * np.sin(6 * np.pi * hum_hz * time + rng.uniform(0, 2 * np.pi))
+                hum = np.zeros(len(time))
+                for order, part in ((1, 1.0), (3, 0.3)):
+                    tone = part * np.sin(2 * np.pi * order * hum_hz * time + rng.uniform(0, 2 * np.pi))
+                    hum += tone * (order * hum_hz < AntiAlias().passband * campaign.rate_hz)  # what a converter passes
                 disturbed = signal + Noise(rms=full_scale * float(noise_of_range[channel]), pink_fraction=pink).draw(
                     rng, len(signal)
                 )

@@ -4,7 +4,8 @@ An impact's response has decayed where its record ends, and a tone has not: the 
 frequency and, channel by channel, its amplitude and phase, and it is subtracted from the whole. The frequency wanders
 from record to record, within what the grid's operators promise [EN50160], and is the same in all channels of one. What
 stands there and decays is a mode. Without that, a tone of a thousandth of the recorder's range, under a window as short
-as the decay of a resonance, exceeds the noise a thousandfold, and records seem to disagree.
+as the decay of a resonance, exceeds the noise a thousandfold, and records seem to disagree. Under such a window a tone
+reaches far: the first multiple above the band is one of those that show in it.
 
 [EN50160] EN 50160:2010, Voltage characteristics of electricity supplied by public electricity networks, 4.2.1.
 """
@@ -128,8 +129,11 @@ def remove_hum(observations: Observations) -> Observations:
     if observations.kind != "hammer" or len(layouts) != 1:
         return observations
     ends = [_End.of(record) for record in observations.records]
-    highest = min(observations.band_hz[1], *(end.highest_hz for end in ends))
-    hum = max((_find_hum(ends, mains, highest) for mains in MAINS_HZ), key=lambda hum: hum.strength)
+    highest = min(end.highest_hz for end in ends)
+    hum = max(
+        (_find_hum(ends, mains, min(observations.band_hz[1] + mains, highest)) for mains in MAINS_HZ),
+        key=lambda hum: hum.strength,
+    )
     if not hum.shows.any():
         return observations
     records = zip(observations.records, ends, hum.mains_hz.tolist(), strict=True)
