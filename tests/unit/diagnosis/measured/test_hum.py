@@ -47,3 +47,12 @@ def test_what_decays_is_a_mode(strike):
 def test_records_without_hum_stay_as_they_are(strike):
     observations = strike()
     assert remove_hum(observations) is observations
+
+
+def test_hum_just_above_the_band_is_subtracted(strike):
+    observations = strike()
+    sizes = sizes_of(observations)
+    band_hz = observations.band_hz[0], 140.0  # the third harmonic stands above
+    quiet, humming = (replace(with_tones(observations, some), band_hz=band_hz) for some in ((0.0, 0.0), sizes))
+    for cleaned, record in zip(remove_hum(humming).records, quiet.records, strict=True):
+        assert np.abs(cleaned.responses[0] - record.responses[0]).max() < LEFT * sizes[1]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.measured.preprocessing.noise_levels import measure_noise_levels
+from frf_ipz.diagnosis.measured.preprocessing.noise_levels import _decays, measure_noise_levels
 from frf_ipz.diagnosis.nonlinear.linearity import assess_linearity
 
 RANGES = 1.0, 4.0, 1.0, 0.25  # of the recorder, record by record
@@ -44,3 +44,11 @@ def test_what_still_decays_is_no_noise(strike):
         records.append(replace(record, responses=record.responses + decaying * np.abs(record.responses).max()))
     decaying_all = replace(observations, records=tuple(records))
     assert measure_noise_levels(decaying_all) is decaying_all
+
+
+def test_steady_noise_that_falls_by_chance_is_no_decay():
+    rng, n_lines, n_channels = np.random.default_rng(5), 400, 8
+    lines = np.hanning(2 * n_lines) * rng.standard_normal((600, 4, 2, 2 * n_lines))  # tests, records, quarters
+    powers = np.median(np.abs(np.fft.rfft(lines)[..., 1:-1]) ** 2, axis=-1)
+    assert not any(_decays(list(map(tuple, of_test)), n_lines, n_channels) for of_test in powers)
+    assert _decays([(1.0, 0.5)] * 4, n_lines, n_channels)
