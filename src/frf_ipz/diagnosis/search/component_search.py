@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,6 +34,8 @@ from frf_ipz.diagnosis.search.robust_refinement import (
 from frf_ipz.diagnosis.search.score_tests import run_score_test
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.evidence.hypothesis import Component
 
@@ -210,11 +212,37 @@ def search_small_component(problem: InferenceProblem, base: Fit, min_log_bayes_f
     """
     fits: Fits = {}
     scored = run_score_test(problem, base)
-    for start in _most_promising(scored, PROMISED_PART * min_log_bayes_factor):
+    for start in _most_promising(_with_location_prior(scored), PROMISED_PART * min_log_bayes_factor):
         _fit_and_keep(problem, base, start, fits)
-    if any(fit.log_evidence > base.log_evidence + PROMISED_PART * min_log_bayes_factor for fit in fits.values()):
-        search_neighbourhoods(problem, base, fits, _count_searched_effects(base, fits))
+    gain = max((fit.log_evidence for fit in fits.values()), default=-np.inf) - base.log_evidence
+    if gain > PROMISED_PART * min_log_bayes_factor:
+        worth_fitting = _promising(scored, PROMISED_PART * gain)
+        search_neighbourhoods(problem, base, fits, _count_searched_effects(base, fits), worth_fitting)
     return Ranking(base=base, fits=rank_fits(problem, fits.values()), n_tried=len(scored))
+
+
+def _with_location_prior(scored: Iterable[Start]) -> list[Start]:
+    """Give scores the prior of their locations: of many, one promises something by chance."""
+    return [replace(start, cost=start.cost + float(np.log(start.component.n_locations))) for start in scored]
+
+
+def _promising(scored: Iterable[Start], min_gain: float) -> Callable[[Component], bool]:
+    """Say which components may gain so much: those that were not scored, and of each effect the best that promise it.
+
+    Small effects act linearly: a location that promises less than another of the same effect is no better.
+    """
+    highest = {name: min(max_cost, -min_gain) for name, max_cost in _best_costs(scored).items()}
+    poor = {start.component.key for start in scored if start.cost > highest[start.component.effect.name] + GAIN}
+    return lambda component: component.key not in poor
+
+
+def _best_costs(scored: Iterable[Start]) -> dict[str, float]:
+    """Give the lowest cost of each effect."""
+    costs: dict[str, float] = {}
+    for start in scored:
+        name = start.component.effect.name
+        costs[name] = min(start.cost, costs.get(name, np.inf))
+    return costs
 
 
 def _add_by_score_test(problem: InferenceProblem, base: Fit, fits: Fits) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -50,7 +50,13 @@ def find_cost_limit(fits: Iterable[Fit]) -> float:
     return COMPLETE_COST_RATIO * best.cost + MAX_BEHIND_COMPLETE
 
 
-def search_neighbourhoods(problem: InferenceProblem, base: Fit, fits: Fits, n_effects: int = N_EFFECTS) -> None:
+def search_neighbourhoods(
+    problem: InferenceProblem,
+    base: Fit,
+    fits: Fits,
+    n_effects: int = N_EFFECTS,
+    worth_fitting: Callable[[Component], bool] = lambda _: True,
+) -> None:
     """Search the neighbourhoods of the best effects, as long as that makes them more probable.
 
     Parameters
@@ -63,10 +69,12 @@ def search_neighbourhoods(problem: InferenceProblem, base: Fit, fits: Fits, n_ef
         By the key of their last component, whose location is changed; new fits are added.
     n_effects : int
         Number of effects, the best ones, whose neighbourhoods are searched.
+    worth_fitting : callable
+        Which components may be as good; no other one is fitted.
     """
     ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
     if ranked and not ranked[0].is_far_off:
-        _add_imitators(problem, base, ranked[0], fits)
+        _add_imitators(problem, base, ranked[0], fits, worth_fitting)
         ranked = sorted(fits.values(), key=lambda fit: -fit.log_evidence)
     leaders: dict[str, Fit] = {}
     for fit in ranked:
@@ -75,13 +83,15 @@ def search_neighbourhoods(problem: InferenceProblem, base: Fit, fits: Fits, n_ef
         best = max(fits.values(), key=lambda fit: fit.log_evidence)
         behind = MAX_BEHIND_COMPLETE if best.explains_nearly_all else MAX_BEHIND
         if leader.log_evidence > best.log_evidence - behind and not leader.is_far_off:
-            _search_neighbourhood(problem, base, leader, fits)
+            _search_neighbourhood(problem, base, leader, fits, worth_fitting)
 
 
-def _add_imitators(problem: InferenceProblem, base: Fit, best: Fit, fits: Fits) -> None:
+def _add_imitators(
+    problem: InferenceProblem, base: Fit, best: Fit, fits: Fits, worth_fitting: Callable[[Component], bool]
+) -> None:
     """Fit imitators of the best, at its location or at one end of it."""
     for imitator in list_imitators(problem, best):
-        if imitator.key not in fits:
+        if imitator.key not in fits and worth_fitting(imitator):
             fits[imitator.key] = fit_from_neighbour(problem, base, imitator, best, find_cost_limit(fits.values()))
 
 
@@ -116,10 +126,13 @@ def _is_within(location: Location, reference: Location) -> bool:
     return is_end or location.place == reference.place
 
 
-def _search_neighbourhood(problem: InferenceProblem, base: Fit, fit: Fit, fits: Fits) -> None:
+def _search_neighbourhood(
+    problem: InferenceProblem, base: Fit, fit: Fit, fits: Fits, worth_fitting: Callable[[Component], bool]
+) -> None:
     for _ in range(MAX_STEPS):
         component = fit.hypothesis.components[-1]
-        beside = component.effect.neighbours(problem.context, component.location)
+        neighbours = component.effect.neighbours(problem.context, component.location)
+        beside = [location for location in neighbours if worth_fitting(replace(component, location=location))]
         better = _best_of_locations(problem, base, fit, beside, fits)
         if better is fit:
             _continue_unfinished(problem, base, fit, beside, fits)

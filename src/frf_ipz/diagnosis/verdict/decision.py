@@ -169,8 +169,10 @@ def _accept_first(problem: InferenceProblem, first: Decision) -> Decision:
     required = min(FIRST_LOG_BAYES_FACTOR, LIMITS[problem.kind].second_log_bayes_factor)
     if not first.null_goodness.is_good and log_bayes_factor(first.final, first.null) < required:
         return replace(first, verdict=DiagnosisVerdict.UNEXPLAINED, final=first.null, goodness=first.null_goodness)
-    second = rescore_ambiguity_set(problem, search_small_component(problem, first.final, required_beside(problem)))
+    second = search_small_component(problem, first.final, required_beside(problem))
     pair_decision = _accept_further(problem, first, second)
+    if pair_decision is not None:  # the largest evidence stays what it is: what is refused need not be rescored
+        pair_decision = _accept_further(problem, first, rescore_ambiguity_set(problem, second))
     if pair_decision is None and first.goodness.score > PAIR_SCORE:
         pair_decision = _accept_further(problem, first, _search_pair(problem, first.ranking))
     return pair_decision or first

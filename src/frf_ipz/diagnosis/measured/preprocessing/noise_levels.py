@@ -75,7 +75,7 @@ def _decays(powers: Sequence[tuple[float, float]], n_lines: int, n_channels: int
     earlier, later = np.array(powers).T
     std = float(np.sqrt(np.sum(earlier**2 + later**2) / (INDEPENDENT * n_lines))) / np.log(2)
     fall = float(np.sum(earlier - later))
-    return fall > (1 - STEADY) * earlier.sum() and fall > -float(ndtri(CHANCE / n_channels)) * std
+    return bool(fall > (1 - STEADY) * np.sum(earlier) and fall > -float(ndtri(CHANCE / n_channels)) * std)
 
 
 def _lines_above(record: ObservedRecord, highest_hz: float) -> BoolArray:
