@@ -79,7 +79,7 @@ def test_a_neighbour_whose_fit_was_stopped_early_is_continued(nominal, times, is
         true, has_converged=False, misfit=2 * times * neighbour.cost, log_evidence=neighbour.log_evidence - 100
     )
     fits = {fit.hypothesis.components[-1].key: fit for fit in (neighbour, on_its_way)}
-    climb._search_neighbourhood(problem, base, neighbour, fits)
+    climb._search_neighbourhood(problem, base, neighbour, fits, lambda _: True)
     assert fits[true.hypothesis.components[-1].key].has_converged == is_settled
     assert (likeliest(fits.values()).hypothesis.components[-1].location == {"nodes": [12]}) == is_settled
 
@@ -91,7 +91,7 @@ def test_a_neighbour_that_cannot_be_continued_is_fitted_anew_from_the_best(nomin
     stuck = replace(true, has_converged=False, misfit=2 * neighbour.cost, log_evidence=neighbour.log_evidence - 100)
     monkeypatch.setattr(type(problem), "fit_to_convergence", lambda _bench, fit: fit)
     fits = {fit.hypothesis.components[-1].key: fit for fit in (neighbour, stuck)}
-    climb._search_neighbourhood(problem, fit_null_model(problem), neighbour, fits)
+    climb._search_neighbourhood(problem, fit_null_model(problem), neighbour, fits, lambda _: True)
     assert likeliest(fits.values()).hypothesis.components[-1].location == {"nodes": [12]}
     assert likeliest(fits.values()).cost == pytest.approx(true.cost, rel=SEEN)
 
