@@ -181,6 +181,41 @@ class Whitening:
             white[frfs] = part.reshape(len(frfs), 2 * n_points, -1)
         return np.ascontiguousarray(white.reshape(n_frfs * 2 * n_points, *rest))
 
+    def transposed(self, columns: FloatArray) -> FloatArray:
+        """Bring columns before what several FRFs share is removed: products with whitened errors stay.
+
+        Parameters
+        ----------
+        columns : (2 n_points n_frfs, n) array
+            To be multiplied by whitened errors.
+
+        Returns
+        -------
+        (n_frfs, 2 n_points, n) array
+            To be multiplied by errors that are whitened FRF by FRF.
+        """
+        n_frfs, n_points = self.factors.shape[:2]
+        before = columns.reshape(n_frfs, 2 * n_points, -1).copy()
+        for frfs, directions, shrink in reversed(self.blocks):
+            part = before[frfs].reshape(len(frfs) * 2 * n_points, -1)
+            part -= directions @ (shrink[:, None] * (directions.T @ part))
+            before[frfs] = part.reshape(len(frfs), 2 * n_points, -1)
+        return before
+
+    def shared_rows(self) -> FloatArray:
+        """Give what several FRFs share, (n_frfs, 2 n_points, n) array.
+
+        The squares of its products with errors that are whitened FRF by FRF are what the removal takes off their
+        square: ``|w - D s D^T w|^2 = |w|^2 - |sqrt(2 s - s^2) D^T w|^2``.
+        """
+        n_frfs, n_points = self.factors.shape[:2]
+        rows = [np.zeros((n_frfs, 2 * n_points, 0))]
+        for frfs, directions, shrink in self.blocks:
+            embedded = np.zeros((n_frfs, 2 * n_points, len(shrink)))
+            embedded[frfs] = (directions * np.sqrt(shrink * (2 - shrink))).reshape(len(frfs), 2 * n_points, -1)
+            rows.append(embedded)
+        return np.concatenate(rows, axis=2)
+
 
 def _whiten_separately(factors: ComplexArray, errors: ComplexArray) -> FloatArray:
     """Whiten each FRF by itself, (n_frfs, 2 n_points, n) array; what leaves an FRF as it is costs nothing there."""

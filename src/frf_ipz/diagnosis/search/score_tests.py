@@ -135,9 +135,79 @@ class ScoreTest:
         products = self.misfit @ white - misfit_explained @ explained
         return products / squares, 0.5 * products**2 / squares
 
+    def sum_over_points(self) -> ShapeScores:
+        """Prepare scores of changes that are one function of FRFs and point times many of the point alone.
+
+        All that a score needs of a whitened change are products with columns of which there are as many as nuisance
+        parameters, and its own square: both are sums over points, whose terms are known before the changes are.
+        """
+        whitening, n_points = self.data.whitening, len(self.data.measured.s)
+        columns, by_gains = np.column_stack([self.columns, self.misfit]), self.data.gain_directions(self.response)
+        rows = whitening.transposed(np.hstack([columns - by_gains @ (by_gains.T @ columns), by_gains]))
+        rows = np.concatenate([rows, whitening.shared_rows()], axis=2)
+        n_frfs = len(self.data.measured.labels)
+        parts = rows.reshape(n_frfs, 2, n_points, -1)
+        gains = np.sqrt(2.0) * self.data.gains(self.response)[:, None, None]
+        factors = gains * whitening.factors
+        return ShapeScores(
+            test=self,
+            products=np.ascontiguousarray(
+                ((parts[:, 0] - 1j * parts[:, 1]).swapaxes(1, 2) @ factors).transpose(2, 1, 0)
+            ),
+            squares=np.asarray(factors.conj().swapaxes(1, 2) @ factors),
+            misfit_explained=self.explained_by_nuisance(self.misfit[:, None])[:, 0],
+        )
+
     def _squares(self, misfits: FloatArray) -> FloatArray:
         """Sum the squares of misfits, (n_data, n), that the nuisance cannot explain."""
         return np.asarray(np.sum(misfits**2, 0) - np.sum(self.explained_by_nuisance(misfits) ** 2, 0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShapeScores:
+    """Scores of many shapes along the contour at one location.
+
+    Parameters
+    ----------
+    test : ScoreTest
+        What is scored on top of.
+    products : (n_points, n_rows, n_frfs) complex array
+        Of the FRFs: with the columns of the nuisance, the misfit, and what unknown gains and shared errors take off.
+    squares : (n_frfs, n_points, n_points) complex array
+        Of the FRFs, whitened each by itself.
+    misfit_explained : (n_nuisance,) array
+        What the nuisance explains of the misfit.
+    """
+
+    test: ScoreTest
+    products: ComplexArray
+    squares: ComplexArray
+    misfit_explained: FloatArray
+
+    def score(self, across: ComplexArray, shapes: ComplexArray) -> tuple[FloatArray, FloatArray]:
+        """Find the best sizes of changes, and the gain of each, as `ScoreTest.score_changes` does one by one.
+
+        Parameters
+        ----------
+        across : (n_points, n_frfs) complex array
+            What each shape is multiplied by.
+        shapes : (n_shapes, n_points) complex array
+            Along the contour.
+
+        Returns
+        -------
+        sizes, gains : (n_shapes,) array
+            Sizes may be negative; gains in log-likelihood.
+        """
+        n_nuisance = len(self.misfit_explained)
+        rows = ((self.products @ across[:, :, None])[:, :, 0].T @ shapes.T).real
+        by_points = np.einsum("fij,if,jf->ij", self.squares, across.conj(), across, optimize=True)
+        whole = np.sum(shapes.conj() * (shapes @ by_points.T), axis=1).real
+        explained = linalg.solve_triangular(self.test.factor, rows[:n_nuisance], lower=True, check_finite=False)
+        squares = whole - np.sum(rows[n_nuisance + 1 :] ** 2, axis=0)
+        squares = np.maximum(squares - np.sum(explained**2, axis=0), 1e-9 * squares + 1e-300)
+        products = rows[n_nuisance] - self.misfit_explained @ explained
+        return products / squares, 0.5 * products**2 / squares
 
 
 def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> ScoreTest:
@@ -226,6 +296,7 @@ def _score_signatures(test: ScoreTest, signed: list[tuple[Component, Signature]]
     """Score all shapes of all signatures; keep the best of each."""
     best: dict[int, Start] = {}
     batch: list[tuple[int, int, ComplexArray]] = []
+    of_shapes = test.sum_over_points() if any(len(signature.shapes) > 1 for _, signature in signed) else None
     for first in range(0, len(signed), MOTIONS_AT_ONCE):
         test.problem.deadline.check()
         group = signed[first : first + MOTIONS_AT_ONCE]
@@ -236,11 +307,14 @@ def _score_signatures(test: ScoreTest, signed: list[tuple[Component, Signature]]
         each = evaluate_receptances(test.response, hypothesis.basis, layout, motions, np.zeros(len(motions))).across
         across = np.add.reduceat(each, firsts, axis=2)
         for column, (_, signature) in enumerate(group):
-            for shape, curve in enumerate(signature.shapes):
-                batch.append((first + column, shape, -across[:, :, column] * curve[:, None]))
-                if len(batch) == BATCH_SIZE:
-                    _score_batch(test, signed, batch, best)
-                    batch = []
+            if of_shapes is not None and len(signature.shapes) > 1:
+                indices = [(first + column, shape) for shape in range(len(signature.shapes))]
+                _keep_best(signed, indices, *of_shapes.score(-across[:, :, column], signature.shapes), best)
+                continue
+            batch.append((first + column, 0, -across[:, :, column] * signature.shapes[0][:, None]))
+            if len(batch) == BATCH_SIZE:
+                _score_batch(test, signed, batch, best)
+                batch = []
     if batch:
         _score_batch(test, signed, batch, best)
     return list(best.values())
@@ -252,8 +326,19 @@ def _score_batch(
     batch: list[tuple[int, int, ComplexArray]],
     best: dict[int, Start],
 ) -> None:
-    sizes, gains = test.score_changes(np.stack([change for _, _, change in batch], 2))
-    for (index, shape, _), size, gain in zip(batch, sizes.tolist(), gains.tolist(), strict=True):
+    indices = [(index, shape) for index, shape, _ in batch]
+    _keep_best(signed, indices, *test.score_changes(np.stack([change for _, _, change in batch], 2)), best)
+
+
+def _keep_best(
+    signed: list[tuple[Component, Signature]],
+    indices: list[tuple[int, int]],
+    sizes: FloatArray,
+    gains: FloatArray,
+    best: dict[int, Start],
+) -> None:
+    """Keep the best shape of each signature, of those whose size is positive."""
+    for (index, shape), size, gain in zip(indices, sizes.tolist(), gains.tolist(), strict=True):
         if size > 0 and (index not in best or -gain < best[index].cost):
             component, signature = signed[index]
             values = signature.values[shape].copy()

@@ -1,0 +1,48 @@
+"""Scores of many shapes at one location: those of the changes one by one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosed import beam, labels, measured, problem_of
+from frf_ipz.diagnosis.evidence.inference_problem import make_data
+from frf_ipz.diagnosis.search.component_search import fit_null_model
+from frf_ipz.diagnosis.search.score_tests import prepare_score_test
+
+EXACT = 1e-8  # relative: sums of products of some thousand values
+N_SHAPES, N_SHARED = 7, 3
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory):
+    model = beam(tmp_path_factory.mktemp("beam"))
+    problem = problem_of(model, measured(model, labels(inputs=("6:+z", "12:+z"))), ("added_mass",))
+    return problem, fit_null_model(problem)
+
+
+def with_shared_errors(data, rng):
+    """Let FRFs of each excited point share errors, as noise of its force does."""
+    blocks = []
+    for index in np.unique(data.measured.input_index):
+        frfs = np.flatnonzero(data.measured.input_index == index)
+        columns = rng.standard_normal((len(frfs) * 2 * len(data.measured.s), N_SHARED))
+        blocks.append((frfs, np.linalg.qr(columns)[0], rng.uniform(0.1, 0.9, N_SHARED)))
+    return replace(data, whitening=replace(data.whitening, blocks=tuple(blocks)))
+
+
+@pytest.mark.parametrize("free_gains", ["none", "common", "per_channel"])
+@pytest.mark.parametrize("is_shared", [False, True])
+def test_shapes_are_scored_together_as_they_are_one_by_one(base, free_gains, is_shared):
+    problem, fit = base
+    rng = np.random.default_rng(5)
+    data = make_data(problem.sparse_data.measured, problem.context.options, free_gains=free_gains)
+    test = prepare_score_test(problem, fit, with_shared_errors(data, rng) if is_shared else data)
+    n_points, n_frfs = test.response.values.shape
+    drawn = rng.standard_normal((2, n_points, n_frfs))
+    across = test.response.values * (drawn[0] + 1j * drawn[1])
+    shapes = rng.standard_normal((N_SHAPES, n_points)) + 1j * rng.standard_normal((N_SHAPES, n_points))
+    together = test.sum_over_points().score(across, shapes)
+    one_by_one = test.score_changes(np.stack([across * shape[:, None] for shape in shapes], 2))
+    for values, expected in zip(together, one_by_one, strict=True):
+        np.testing.assert_allclose(values, expected, rtol=EXACT, atol=0)
