@@ -19,7 +19,7 @@ MODES = Structure(
     damping_ratio=(0.015, 0.01, 0.008, 0.008),
     shapes=((1.0, 0.7, -0.5, 0.8), (0.6, -0.8, 0.9, 0.4)),
 )
-CALIBRATED = (0.5, 1.5)  # the bar of the project, 0.8 to 1.3, and what a dozen numbers scatter
+CALIBRATED = (0.5, 1.5)  # the bar of the project, 0.8 to 1.3, and what a dozen or two of numbers scatter
 
 
 def impacts(seed, *, delay_s=0.0, begins_at=0.0, force_noise=5e-3, response_noise=5e-3, count=5):
@@ -65,9 +65,9 @@ def test_a_delay_is_as_uncertain_as_the_missing_part_of_the_pulse_makes_it():
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [{"force_noise": 0.2}, {"response_noise": 0.05}], ids=["force", "response"])
 def test_the_deviation_knows_the_noise_that_lines_share(noise):
-    found = [find_modes(impacts(seed, delay_s=1e-3, **noise), FitOptions()).common_delay for seed in range(60, 72)]
+    found = [find_modes(impacts(seed, delay_s=1e-3, **noise), FitOptions()).common_delay for seed in range(60, 84)]
     errors = [(delay.delay_s - 1e-3) / delay.std_s for delay in found]
-    assert CALIBRATED[0] < np.sqrt(np.mean(np.square(errors))) < CALIBRATED[1] * (1 + 0.2)  # 12 numbers: rms scatters by 0.2
+    assert CALIBRATED[0] < np.sqrt(np.mean(np.square(errors))) < CALIBRATED[1]
 
 
 def test_what_a_record_lacks_of_its_force_is_how_much_too_large_frfs_are():
