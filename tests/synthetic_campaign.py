@@ -12,6 +12,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as arrow_csv
 
+from frf_ipz import Recording, VibrationTest
+
 PAD = 4  # times the record: what the transform is made on
 WRAPPED = 24.0  # exp(-24) of the motion wraps around
 AT_S = 0.03  # when the hammer touches
@@ -62,6 +64,21 @@ def impact(structure, *, n_samples=4096, step_s=1 / 2048, noise=0.0, rng=None, f
     if noise:
         signals += noise * rng.standard_normal(signals.shape)
     return signals
+
+
+def in_memory(impacts, *, step_s=1 / 2048, input_dof="7:+z", output_dofs=("1:+z", "2:+z")):
+    """Make a test of impacts, each force and responses, without files."""
+    recordings = [
+        Recording(
+            force=signals[0],
+            responses=signals[1:],
+            sample_rate_hz=1 / step_s,
+            input_dof=input_dof,
+            output_dofs=list(output_dofs),
+        )
+        for signals in impacts
+    ]
+    return VibrationTest.from_recordings(recordings)
 
 
 def write_csv(path, signals, step_s, *, columns=None, delimiter=",", decimal=".", units=None, start_s=0.0):

@@ -8,9 +8,8 @@ import pytest
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.identification.search.find_modes import find_modes
-from frf_ipz.ingest.campaign import Recording, VibrationTest
 from frf_ipz.ingest.estimate import estimate_frfs
-from synthetic_campaign import Structure, pulse, respond
+from synthetic_campaign import Structure, in_memory, pulse, respond
 from synthetic_frfs import accelerances, random_modes
 
 RATE_HZ, N_SAMPLES = 2048.0, 4096
@@ -35,20 +34,7 @@ def impacts(seed, *, delay_s=0.0, begins_at=0.0, force_noise=5e-3, response_nois
         signals += np.array([[force_noise], [response_noise], [response_noise]]) * rng.standard_normal(signals.shape)
         first = int(np.argmax(force > begins_at * height))
         records.append(signals[:, first : first + N_SAMPLES - 100])
-    return estimate_frfs(
-        VibrationTest.from_recordings(
-            [
-                Recording(
-                    force=signals[0],
-                    responses=signals[1:],
-                    sample_rate_hz=RATE_HZ,
-                    input_dof="3:+z",
-                    output_dofs=["5:+z", "2:+z"],
-                )
-                for signals in records
-            ]
-        )
-    ).frfs
+    return estimate_frfs(in_memory(records, step_s=1 / RATE_HZ, input_dof="3:+z", output_dofs=("5:+z", "2:+z"))).frfs
 
 
 def test_a_record_that_begins_in_the_pulse_is_not_late():

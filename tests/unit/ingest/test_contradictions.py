@@ -7,7 +7,7 @@ import frf_ipz
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
-from synthetic_campaign import HIT, Structure, impact, respond, write_csv, write_test
+from synthetic_campaign import HIT, Structure, impact, in_memory, respond, write_csv, write_test
 
 STEP_S = 1 / 2048
 NOISE = 0.02
@@ -268,21 +268,13 @@ def errors_over_std(change, *, force_noise, response_noise, length_s=0.8e-3, see
     squares = []
     for seed in seeds:
         rng = np.random.default_rng(seed)
-        recordings = []
+        impacts = []
         for number in range(5):
             clean = change(impact(Structure(), height=30.0 * 2.0**number, length_s=length_s, at_s=0.06))
             noise = np.array([[force_noise(number)], [response_noise(number)], [response_noise(number)]])
             signals = clean + noise * rng.standard_normal(clean.shape)
-            recordings.append(
-                frf_ipz.Recording(
-                    force=signals[0],
-                    responses=signals[1:],
-                    sample_rate_hz=1 / STEP_S,
-                    input_dof="7:+z",
-                    output_dofs=["1:+z", "2:+z"],
-                )
-            )
-        frfs = frf_ipz.estimate_frfs(frf_ipz.VibrationTest.from_recordings(recordings)).frfs
+            impacts.append(signals)
+        frfs = frf_ipz.estimate_frfs(in_memory(impacts, step_s=STEP_S)).frfs
         band = frfs.in_band((10.0, 900.0))
         error = np.abs(frfs.values[band] - Structure().accelerance(frfs.s[band])) ** 2 / frfs.variance[band]
         squares.append(error[np.isfinite(error)])
@@ -329,20 +321,12 @@ def test_records_that_begin_at_the_peak_say_nothing_of_the_force(tmp_path, late)
 
 def test_lines_where_late_records_lack_most_of_the_force_are_not_used():
     """Where the recorded part has a zero, FRFs would have a pole."""
-    recordings = []
+    impacts = []
     for seed in range(5):
         signals = begin_late(impact(Structure(), length_s=1e-3, at_s=0.06), 0.33)
         signals = signals + 0.01 * np.random.default_rng(seed).standard_normal(signals.shape)
-        recordings.append(
-            frf_ipz.Recording(
-                force=signals[0],
-                responses=signals[1:],
-                sample_rate_hz=1 / STEP_S,
-                input_dof="7:+z",
-                output_dofs=["1:+z", "2:+z"],
-            )
-        )
-    frfs = frf_ipz.estimate_frfs(frf_ipz.VibrationTest.from_recordings(recordings)).frfs
+        impacts.append(signals)
+    frfs = frf_ipz.estimate_frfs(in_memory(impacts, step_s=STEP_S)).frfs
     is_known = np.isfinite(frfs.variance).all(axis=1)
     last = frfs.frequency_hz[is_known][-1]
     assert 250 < last < 1000

@@ -5,7 +5,7 @@ import pytest
 
 import frf_ipz
 from frf_ipz.ingest.survey.noise_weights import noise_weights
-from synthetic_campaign import Structure, impact
+from synthetic_campaign import Structure, impact, in_memory
 
 STRUCTURE = Structure()
 HEIGHTS = (100.0, 60.0, 150.0, 80.0, 120.0)
@@ -16,21 +16,13 @@ BAND_HZ = (5.0, 400.0)
 def estimate(seed, n_impacts=5, loudness=LOUD, loud=1, **options):
     """Estimate FRFs of impacts, one channel of one of which is noisy."""
     rng = np.random.default_rng(seed)
-    recordings = []
+    impacts = []
     for number, height in enumerate(HEIGHTS[:n_impacts]):
         signals = impact(STRUCTURE, height=height, noise=NOISE, rng=rng)
         if number == loud:
             signals[1] += NOISE * np.sqrt(loudness**2 - 1.0) * rng.standard_normal(signals.shape[1])
-        recordings.append(
-            frf_ipz.Recording(
-                force=signals[0],
-                responses=signals[1:],
-                sample_rate_hz=2048.0,
-                input_dof="7:+z",
-                output_dofs=["1:+z", "2:+z"],
-            )
-        )
-    test = frf_ipz.VibrationTest.from_recordings(recordings)
+        impacts.append(signals)
+    test = in_memory(impacts)
     return frf_ipz.estimate_frfs(test, options=frf_ipz.IngestOptions(**options))
 
 

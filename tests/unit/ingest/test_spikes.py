@@ -5,7 +5,7 @@ import pytest
 
 import frf_ipz
 from frf_ipz.ingest.signals.spikes import find_spikes
-from synthetic_campaign import Structure, impact
+from synthetic_campaign import Structure, impact, in_memory
 
 STRUCTURE = Structure()
 HEIGHTS = (100.0, 60.0, 150.0, 80.0, 120.0)
@@ -17,21 +17,13 @@ BAND_HZ = (5.0, 400.0)
 def estimate(seed, n_impacts=5, size=20.0):
     """Estimate FRFs of impacts; the first channel of the second jumps for a moment, by so many m/s^2."""
     rng = np.random.default_rng(seed)
-    recordings = []
+    impacts = []
     for number, height in enumerate(HEIGHTS[:n_impacts]):
         signals = impact(STRUCTURE, height=height, noise=NOISE, rng=rng)
         if number == min(1, n_impacts - 1):
             signals[1, AT : AT + BURST] += size * rng.standard_normal(BURST)
-        recordings.append(
-            frf_ipz.Recording(
-                force=signals[0],
-                responses=signals[1:],
-                sample_rate_hz=2048.0,
-                input_dof="7:+z",
-                output_dofs=["1:+z", "2:+z"],
-            )
-        )
-    return frf_ipz.estimate_frfs(frf_ipz.VibrationTest.from_recordings(recordings))
+        impacts.append(signals)
+    return frf_ipz.estimate_frfs(in_memory(impacts))
 
 
 def relative_errors(frfs):

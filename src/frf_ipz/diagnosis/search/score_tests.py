@@ -131,9 +131,7 @@ class ScoreTest:
         white = self.data.slopes(self.response, changes)
         explained = self.explained_by_nuisance(white)
         misfit_explained = self.explained_by_nuisance(self.misfit[:, None])[:, 0]
-        squares = np.maximum(np.sum(white**2, 0) - np.sum(explained**2, 0), 1e-9 * np.sum(white**2, 0) + 1e-300)
-        products = self.misfit @ white - misfit_explained @ explained
-        return products / squares, 0.5 * products**2 / squares
+        return _best_sizes(self.misfit @ white - misfit_explained @ explained, np.sum(white**2, 0), explained)
 
     def sum_over_points(self) -> ShapeScores:
         """Prepare scores of changes that are one function of FRFs and point times many of the point alone.
@@ -205,9 +203,13 @@ class ShapeScores:
         whole = np.sum(shapes.conj() * (shapes @ by_points.T), axis=1).real
         explained = linalg.solve_triangular(self.test.factor, rows[:n_nuisance], lower=True, check_finite=False)
         squares = whole - np.sum(rows[n_nuisance + 1 :] ** 2, axis=0)
-        squares = np.maximum(squares - np.sum(explained**2, axis=0), 1e-9 * squares + 1e-300)
-        products = rows[n_nuisance] - self.misfit_explained @ explained
-        return products / squares, 0.5 * products**2 / squares
+        return _best_sizes(rows[n_nuisance] - self.misfit_explained @ explained, squares, explained)
+
+
+def _best_sizes(products: FloatArray, squares: FloatArray, explained: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sizes of changes and their gains: products with the misfit and squares, less what the nuisance explains."""
+    left = np.maximum(squares - np.sum(explained**2, axis=0), 1e-9 * squares + 1e-300)
+    return products / left, 0.5 * products**2 / left
 
 
 def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> ScoreTest:

@@ -265,9 +265,7 @@ def find_dead(spectra: ImpactSpectra, output: int) -> tuple[int, ...]:
     alive = _stands_out(np.abs(response) ** 2, noise)
     if alive.all() or not alive.any() or (alive.sum() > 1 and not _is_coherent(force[alive], response[alive])):
         return ()
-    power = np.sum(np.abs(force[alive]) ** 2, axis=0)
-    frf = np.sum(force[alive].conj() * response[alive], axis=0) / np.maximum(power, np.finfo(float).tiny)
-    is_dead = ~alive & _stands_out(np.abs(frf * force) ** 2, noise)
+    is_dead = ~alive & _stands_out(np.abs(_estimate_h1(force[alive], response[alive]) * force) ** 2, noise)
     return tuple(int(impact) for impact in impacts[is_dead])
 
 
@@ -413,12 +411,15 @@ def _nearest_majority(force: ComplexArray, response: ComplexArray) -> list[int]:
     return sorted(int(place) for place in nearest[best])
 
 
-def _agreement(force: ComplexArray, response: ComplexArray, impacts: list[int]) -> OutputComparison:
+def _estimate_h1(force: ComplexArray, response: ComplexArray) -> ComplexArray:
+    """FRF of some impacts, (n_lines,) array."""
     power = np.sum(np.abs(force) ** 2, axis=0)
-    frf = np.sum(force.conj() * response, axis=0) / np.maximum(power, np.finfo(float).tiny)
+    return np.asarray(np.sum(force.conj() * response, axis=0) / np.maximum(power, np.finfo(float).tiny))
+
+
+def _agreement(force: ComplexArray, response: ComplexArray, impacts: list[int]) -> OutputComparison:
+    frf = _estimate_h1(force, response)
     left = np.sum(np.abs(response - frf * force) ** 2, axis=0) / (len(force) - 1)
     floor = ROUNDING * np.sum(np.abs(response) ** 2, axis=0).max(initial=0.0)
     scatter = fit_noise_power(np.maximum(left, floor), np.abs(frf) ** 2, len(force) - 1.0)
-    return OutputComparison(
-        agreeing=tuple(impacts), contradicting=(), reversed_sign=(), frf=np.asarray(frf), scatter=scatter
-    )
+    return OutputComparison(agreeing=tuple(impacts), contradicting=(), reversed_sign=(), frf=frf, scatter=scatter)

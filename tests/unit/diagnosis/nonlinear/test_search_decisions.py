@@ -9,9 +9,9 @@ import pytest
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.nonlinear import search
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import ForceLocalisation
-from frf_ipz.diagnosis.nonlinear.fitting.simple_laws import SimpleLawsFit
 from frf_ipz.diagnosis.nonlinear.nonlinear_evidence import Agreement
 from frf_ipz.diagnosis.result import DiagnosisVerdict
+from simple_forces import simple_laws_at
 
 LOCATIONS = tuple(range(10))
 
@@ -20,16 +20,6 @@ def law_at(location, cost):
     law = SimpleNamespace(name="cubic")
     return SimpleNamespace(
         law=law, location=location, cost=cost, n_rows=100, strength=1.0, nuisance=np.ones(2), converged=True
-    )
-
-
-def simple_laws_at(location, cost, *, n_rows=100, linear_mean_misfit=50.0):
-    return SimpleLawsFit(
-        location=location,
-        cost=cost,
-        mean_misfit=cost / n_rows,
-        linear_mean_misfit=linear_mean_misfit,
-        nuisance_chi2=1.0,
     )
 
 

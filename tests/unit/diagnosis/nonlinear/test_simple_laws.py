@@ -7,7 +7,8 @@ import pytest
 
 from frf_ipz.diagnosis.nonlinear.fitting import simple_laws
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import ForceLocalisation
-from frf_ipz.diagnosis.nonlinear.fitting.simple_laws import SimpleLawsFit, simple_forces
+from frf_ipz.diagnosis.nonlinear.fitting.simple_laws import simple_forces
+from simple_forces import simple_laws_at
 
 APPROXIMATION = 0.015  # of the force; springs that slip abruptly, which are not smooth, leave 0.12
 LOCATIONS = tuple(range(20))
@@ -33,16 +34,6 @@ def test_a_joint_that_slips_gradually_is_a_sum_of_simple_forces(limit):
     assert np.linalg.norm(force - strengths @ basis) < APPROXIMATION * np.linalg.norm(force)
 
 
-def simple_laws_fit(location, cost, *, n_rows=100, linear_mean_misfit=50.0):
-    return SimpleLawsFit(
-        location=location,
-        cost=cost,
-        mean_misfit=cost / n_rows,
-        linear_mean_misfit=linear_mean_misfit,
-        nuisance_chi2=1.0,
-    )
-
-
 @pytest.fixture
 def problems(monkeypatch):
     """Makes short and long problems, at whose locations simple laws leave costs."""
@@ -51,7 +42,7 @@ def problems(monkeypatch):
         monkeypatch.setattr(
             simple_laws,
             "fit_simple_laws",
-            lambda problem, location, _: simple_laws_fit(
+            lambda problem, location, _: simple_laws_at(
                 location, costs[problem.name, location], linear_mean_misfit=problem.mean_misfit
             ),
         )
@@ -103,9 +94,7 @@ def test_neighbours_of_several_locations_are_searched(problems, monkeypatch):
 def test_locations_that_explain_as_well_are_in_the_ambiguity_set():
     """Of 100 data 20 is left, so that a drop of 3 distinguishes locations."""
     costs = {4: 22.5, 5: 20.0, 6: 21.0, 7: 23.5}
-    best = simple_laws._with_ambiguity_set([simple_laws_fit(location, cost) for location, cost in costs.items()])
+    best = simple_laws._with_ambiguity_set([simple_laws_at(location, cost) for location, cost in costs.items()])
     assert best.ambiguity_set == (5, 6, 4)
-    larger = simple_laws._with_ambiguity_set(
-        [simple_laws_fit(location, 100 * cost) for location, cost in costs.items()]
-    )
+    larger = simple_laws._with_ambiguity_set([simple_laws_at(location, 100 * cost) for location, cost in costs.items()])
     assert larger.ambiguity_set == (5,)
