@@ -228,6 +228,7 @@ def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
         fit="fit",
         nuisance_prior=at_rest,
         is_early=early[0],
+        unknown_force=None,
         dispersion_rad=0.0,
     )
     beside_cause = SimpleNamespace(verdict="explained", nuisance_chi2=relieved, is_early=early[1])
