@@ -154,7 +154,7 @@ def _power_of_halves(signal: FloatArray, half: int, step_s: float) -> tuple[Floa
 
 
 def _noise_floor(power: FloatArray) -> FloatArray:
-    return np.asarray(median_filter(power, NEIGHBOURS, mode="mirror") / MEDIAN)
+    return np.asarray(median_filter(power, NEIGHBOURS, mode="nearest") / MEDIAN)
 
 
 def _is_notable(power: FloatArray, frequency_hz: FloatArray, derivative: int) -> BoolArray:
