@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
+from scipy.sparse.csgraph import connected_components
 
 from frf_ipz.arrays import BoolArray, FloatArray
 from frf_ipz.errors import InputError
@@ -32,7 +33,9 @@ ROUNDING = (
     1e3 * EPS
 )  # of the sum of all terms' sizes: a reduced model's matrices hold the condition number of its modes
 LOWEST_RATE = 1e-6  # of the highest natural frequency: lower bound of the rate by which a mode is scaled
-UNSEEN = 1e-9  # of the largest share of a mode in a port: no resonance lifts what is below to where it matters
+UNSEEN = (
+    1e-9  # of the largest residue, coupling or port of a mode: no resonance lifts what is below to where it matters
+)
 
 
 class Matrices(NamedTuple):
@@ -130,7 +133,7 @@ def _elastic_modes(model: ReducedModel, rigid: FloatArray) -> FloatArray:
 def select_states(system: SecondOrder) -> Selection:
     """Find the modes that some input drives and some output sees.
 
-    A mode that is coupled to others, by damping or by an unsymmetric stiffness, is among them.
+    Modes that are coupled, by damping or by an unsymmetric stiffness, are driven and seen together.
 
     Parameters
     ----------
@@ -144,13 +147,14 @@ def select_states(system: SecondOrder) -> Selection:
     """
     n_rigid = system.n_rigid
     share_in, share_out = _shares(system.inputs.T).max(0), _shares(system.outputs).max(0)
-    elastic = np.minimum(share_in, share_out)[n_rigid:] > UNSEEN
     rates = np.sqrt(np.abs(np.diag(system.stiffness)))[n_rigid:]
     with np.errstate(divide="ignore", invalid="ignore"):  # a mode without stiffness that is no rigid-body mode
         coupling = np.abs(system.damping[n_rigid:, n_rigid:]) / np.sqrt(np.outer(rates, rates))
         coupling = np.maximum(coupling, np.abs(system.stiffness[n_rigid:, n_rigid:]) / np.outer(rates, rates))
-    coupled = ~(coupling <= UNSEEN) & ~np.eye(len(rates), dtype=bool)
-    elastic |= (coupled | coupled.T).any(0)
+    _, group = connected_components(~(coupling <= UNSEEN), directed=False)
+    together = group[:, None] == group
+    share_in, share_out = (np.max(together * share[n_rigid:], axis=1, initial=0.0) for share in (share_in, share_out))
+    elastic = share_in * share_out > UNSEEN
     driven = _rank(system, system.inputs.T, np.eye(n_rigid))
     seen = _rank(system, system.outputs, _leading(system, system.inputs.T, np.eye(n_rigid), driven))
     if not seen and not elastic.any():

@@ -24,6 +24,9 @@ from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.errors import NumericalError
 
 INFINITE = 1e-13  # beta over alpha of a root that QZ cannot distinguish from infinity
+EQUAL = (
+    1e-6  # relative, of omega^2 of modes that are told apart by what moves them only: far below what a test resolves
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -179,6 +182,35 @@ def modes_of_stack(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray,
     lower = np.linalg.inv(np.linalg.cholesky(mass))
     values, vectors = np.linalg.eigh(lower @ stiffness @ lower.swapaxes(-1, -2))
     return values, lower.swapaxes(-1, -2) @ vectors
+
+
+def separate_equal_modes(eigenvalues: FloatArray, at_ports: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Turn modes of one frequency so that as many as can keep still at the ports do.
+
+    Any combination of them is a mode too: of a square tube, bending along its axes as well as along its diagonals. What
+    moves the ports, in order of how far, are the right singular vectors of the shapes there.
+
+    Parameters
+    ----------
+    eigenvalues : (r,) array
+        Ascending, (rad/s)^2.
+    at_ports : (n_ports, r) array
+        Mass-normalised shapes there.
+
+    Returns
+    -------
+    eigenvalues : (r,) array
+        The mean of those that are equal to within 1e-6, far below what a test resolves.
+    turn : (r, r) array
+        Orthogonal: shapes @ turn are the new ones.
+    """
+    values, turn = eigenvalues.copy(), np.eye(len(eigenvalues))
+    steps = np.diff(eigenvalues) > EQUAL * np.abs(eigenvalues[1:])
+    for modes in np.split(np.arange(len(eigenvalues)), np.flatnonzero(steps) + 1):
+        if len(modes) > 1:
+            values[modes] = values[modes].mean()
+            turn[np.ix_(modes, modes)] = np.linalg.svd(at_ports[:, modes])[2].T
+    return values, turn
 
 
 def undamped_poles(mass: FloatArray, stiffness: FloatArray) -> Roots:

@@ -79,6 +79,12 @@ class UpdateProblem:
         """The FRFs that have zeros among the targets."""
         return tuple(int(number) for number in np.unique(self.frf[self.frf >= 0]))
 
+    @property
+    def at_ports(self) -> FloatArray:
+        """Rows of all that was measured and excited, (2 n_frfs, r)."""
+        rows = [row for number in range(len(self.labels)) for row in self.rows(number)]
+        return np.array(rows).reshape(-1, len(self.model.mass))
+
     def rows(self, frf: int) -> tuple[FloatArray, FloatArray]:
         """Output and input row of an FRF, each (r,).
 

@@ -43,7 +43,7 @@ def problem(request, case):
 
 
 def stiffness_phase(problem):
-    return minimal_change._stiffness_phase(problem, frame_of(problem.model))
+    return minimal_change._stiffness_phase(problem, frame_of(problem.model, problem.at_ports))
 
 
 def differences(value, count):
@@ -73,7 +73,7 @@ def test_damping_slopes_against_differences(case, has_damper):
         damper = damper_at(problem, STRONG / 10)
         damped = replace(problem.model, damping=problem.model.damping + damper, dashpots=damper)
         problem = replace(problem, model=damped)
-    frame = frame_of(problem.model)
+    frame = frame_of(problem.model, problem.at_ports)
     phase = minimal_change._stiffness_phase(problem, frame)
     result = iterate(phase, phase.named_roots(np.zeros(len(phase.basis.names)), problem.computed))
     inner = modal_frame(*phase.matrices(result.theta))
@@ -143,7 +143,7 @@ def test_a_correct_stiffness_does_not_change_with_damping(case):
         covariance=problem.covariance[np.ix_(np.repeat(is_pole, 2), np.repeat(is_pole, 2))],
         names=tuple(name for name, selected in zip(problem.names, is_pole, strict=True) if selected),
     )
-    undamped = np.sqrt(np.abs(minimal_change._stiffness_phase(known, frame_of(damped)).eigenvalues))
+    undamped = np.sqrt(np.abs(minimal_change._stiffness_phase(known, frame_of(damped, known.at_ports)).eigenvalues))
     assert np.abs(np.abs(damped_roots[is_pole]) / undamped[undamped > 0][: is_pole.sum()] - 1).max() > 0
     updated = minimal_change.update(known, UpdateOptions(ensemble=2), silent).model
     assert np.abs(updated.stiffness - damped.stiffness).max() < UNTOUCHED * np.abs(damped.stiffness).max()

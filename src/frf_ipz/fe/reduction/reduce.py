@@ -10,7 +10,7 @@ sensitivity approach, Control Engineering Practice 71, 2018, 164-174, doi:10.101
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +27,7 @@ from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.fe.reduction.plan import ReductionPlan, plan_reduction
 from frf_ipz.fe.reduction.retained_dofs import MAX_CONDITION, choose_retained_rows, condition_number
 from frf_ipz.frf import require_measured
+from frf_ipz.numerics.pencils import separate_equal_modes
 from frf_ipz.structure import ReducedModel, StructuralModel
 
 if TYPE_CHECKING:
@@ -163,7 +164,7 @@ def reduce_to_dofs(
         origin = "from the test" if default_damping_ratio is not None else "by default"
         notes.append(f"damping: {nominal:g} for every mode, {origin}")
     plan = plan_reduction(damped, options or ReduceOptions(), actuators=actuators, sensors=sensors, points=points)
-    basis = _solve_retained_modes(damped, plan, band_hz, notes)
+    basis = _turned_to_ports(damped, _solve_retained_modes(damped, plan, band_hz, notes), plan)
     ritz = _with_residual_vectors(damped, basis, plan, notes)
     rows = _retained_rows(damped, ritz, plan, notes)
     return _reduced_model(damped, ritz, rows, plan, tuple(notes))
@@ -219,6 +220,14 @@ def _solve_retained_modes(
         notes.append(f"modes: {count - in_margin} more, so that actuators, sensors and points are retained DOFs")
         basis = solve_basis(model, n_modes=count)
     return basis
+
+
+def _turned_to_ports(model: StructuralModel, basis: ModalBasis, plan: ReductionPlan) -> ModalBasis:
+    at_ports = np.asarray(model.rows(plan.required) @ basis.shapes)
+    elastic = slice(basis.n_rigid, None)
+    values, turn = separate_equal_modes(basis.eigenvalues[elastic], at_ports[:, elastic])
+    shapes = np.hstack([basis.shapes[:, : basis.n_rigid], basis.shapes[:, elastic] @ turn])
+    return replace(basis, eigenvalues=np.concatenate([basis.eigenvalues[: basis.n_rigid], values]), shapes=shapes)
 
 
 def _with_residual_vectors(model: StructuralModel, basis: ModalBasis, plan: ReductionPlan, notes: list[str]) -> _Ritz:

@@ -70,7 +70,7 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     """
     if not len(problem.values):
         return nothing_to_do(problem.model, "minimal-change")
-    frame = frame_of(problem.model)
+    frame = frame_of(problem.model, problem.at_ports)
     update_of = _solve_with_masses(problem, frame, options, progress)
     pairs, again = None, problem.pair_again
     for _ in range(ROUNDS):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray
-from frf_ipz.numerics.pencils import undamped_poles
+from frf_ipz.numerics.pencils import separate_equal_modes, undamped_poles
 
 if TYPE_CHECKING:
     from frf_ipz.structure import ReducedModel
@@ -102,20 +102,27 @@ def is_negative(eigenvalues: FloatArray) -> BoolArray:
     return np.asarray(eigenvalues < -INDEFINITE * np.abs(eigenvalues).max(axis=-1, keepdims=True))
 
 
-def frame_of(model: ReducedModel) -> ModalFrame:
+def frame_of(model: ReducedModel, at_ports: FloatArray) -> ModalFrame:
     """Compute the frame of a reduced model.
+
+    Of modes of one frequency a pole that was measured is the one that moves the ports; how it changes with the matrices
+    follows from the shape that does.
 
     Parameters
     ----------
     model : ReducedModel
         The model.
+    at_ports : (n_ports, r) array
+        Motion of what was excited and measured for unit motions of the retained DOFs.
 
     Returns
     -------
     ModalFrame
-        Its modes.
+        Its modes, those of one frequency turned to the ports.
     """
-    return modal_frame(model.mass, model.stiffness)
+    frame = modal_frame(model.mass, model.stiffness)
+    eigenvalues, turn = separate_equal_modes(frame.eigenvalues, at_ports @ frame.shapes)
+    return ModalFrame(eigenvalues=eigenvalues, shapes=frame.shapes @ turn, inverse=turn.T @ frame.inverse)
 
 
 def modal_parameters(frame: ModalFrame, basis: ParameterBasis) -> ParameterBasis:
