@@ -34,8 +34,6 @@ ROUNDING = (
 )  # of the sum of all terms' sizes: a reduced model's matrices hold the condition number of its modes
 LOWEST_RATE = 1e-6  # of the highest natural frequency: lower bound of the rate by which a mode is scaled
 UNSEEN = 1e-9  # of the largest residue, coupling or port: no resonance lifts what is below to where it matters
-    1e-9  # of the largest residue, coupling or port of a mode: no resonance lifts what is below to where it matters
-)
 
 
 class Matrices(NamedTuple):

@@ -25,8 +25,6 @@ from frf_ipz.errors import NumericalError
 
 INFINITE = 1e-13  # beta over alpha of a root that QZ cannot distinguish from infinity
 EQUAL = 1e-6  # relative, of omega^2: far below what a test resolves, far above rounding
-    1e-6  # relative, of omega^2 of modes that are told apart by what moves them only: far below what a test resolves
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
