@@ -53,6 +53,9 @@ def fit_products(matrix: ComplexArray | FloatArray, weight: FloatArray, rank: in
 
 def _fit_rows(matrix: ComplexArray | FloatArray, weight: FloatArray, columns: ComplexArray) -> ComplexArray:
     """Coefficients of each row in the columns."""
-    normal = np.einsum("...ij,...jr,...jq->...irq", weight, columns.conj(), columns)
-    right = np.einsum("...ij,...jr->...ir", weight * matrix, columns.conj())
-    return np.asarray((np.linalg.pinv(normal, hermitian=True) @ right[..., None])[..., 0])
+    rank = columns.shape[-1]
+    pairs = (columns.conj()[..., :, None] * columns[..., None, :]).reshape(*columns.shape[:-1], rank**2)
+    normal = (weight @ pairs).reshape(*weight.shape[:-1], rank, rank)
+    size = np.trace(normal, axis1=-2, axis2=-1).real[..., None, None]
+    ridge = (np.finfo(float).eps * size + np.finfo(float).tiny) * np.eye(rank)  # where a row has no weight
+    return np.asarray(np.linalg.solve(normal + ridge, ((weight * matrix) @ columns.conj())[..., None])[..., 0])

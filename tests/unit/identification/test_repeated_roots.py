@@ -7,6 +7,7 @@ import pytest
 
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.identification.options import FitOptions
+from frf_ipz.identification.results.repeated_roots import BEYOND_DOUBT, _probability_of_rank_two
 from frf_ipz.identification.results.shapes import mode_shapes
 from synthetic_frfs import Modes, accelerances, frf_set, labels_of, random_modes, with_noise
 
@@ -75,6 +76,44 @@ def test_shapes_that_differ_by_the_mounting_are_no_second_mode():
     gains = 1 + 0.05 * np.random.default_rng(SEED).standard_normal(frfs.n_frfs)
     fit = fit_modes(replace(frfs, values=frfs.values * gains), options=FitOptions())
     assert fit.n_modes == 3
+
+
+def disc(gains):
+    """Two pairs of equal modes, of two and of three nodal diameters, and one mode without any."""
+    at = [np.radians(angles) for angles in ([0.0, 40.0, 130.0, 220.0, 280.0, 340.0], [0.0, 35.0, 100.0])]
+    outputs, inputs = (
+        np.array([np.cos(2 * a), np.sin(2 * a), 0.8 + 0 * a, np.cos(3 * a), np.sin(3 * a)]).T for a in at
+    )
+    truth = Modes(np.array([70.0, 70.0, 110.0, 160.0, 160.0]), np.full(5, 0.003), outputs, inputs)
+    frfs = accelerances(truth, LINES_HZ, noise=1e-3, seed=SEED)
+    return replace(frfs, values=frfs.values * (1 + gains * np.random.default_rng(1).standard_normal(frfs.n_frfs)))
+
+
+@pytest.mark.parametrize("gains", [0.0, 0.01, 0.03])
+def test_each_of_two_repeated_roots_is_found(gains):
+    """What other modes leave of one product tells how far gains differ, unless these are repeated roots too."""
+    fit = fit_modes(disc(gains), options=FitOptions())
+    np.testing.assert_allclose(fit.modes["frequency_hz"], [70.0, 70.0, 110.0, 160.0, 160.0], rtol=2e-4, atol=0)
+
+
+@pytest.mark.parametrize(("gains", "noise"), [(0.0, 1.0), (0.02, 1.0), (0.1, 1.0), (0.03, 3.0)])
+def test_gains_and_noise_make_no_second_mode_and_hide_none(gains, noise):
+    """Of residues of one to eight modes, in grids of any size, with noise as stated and larger."""
+    rng, found, n_repeated = np.random.default_rng(SEED), 0, 0
+    for _ in range(40):
+        n_modes, shape = rng.integers(1, 9), (rng.integers(2, 9), rng.integers(2, 5))
+        repeated = rng.random(n_modes) < 0.3
+        first, second = (
+            rng.standard_normal((n_modes, shape[0], 1)) * rng.standard_normal((n_modes, 1, shape[1])) for _ in range(2)
+        )
+        exact = (first + repeated[:, None, None] * second) * np.exp(rng.uniform(-1, 1, (n_modes, 1, 1)))
+        std = np.abs(exact).mean(axis=(1, 2), keepdims=True) * np.exp(rng.uniform(-9, -4)) + 0 * exact
+        error = std / np.sqrt(2) * (rng.standard_normal(exact.shape) + 1j * rng.standard_normal(exact.shape))
+        products = exact * (1 + gains * rng.standard_normal(shape)) + noise * error
+        is_found = _probability_of_rank_two(products, std**2) > BEYOND_DOUBT
+        assert not np.any(is_found & ~repeated)
+        found, n_repeated = found + is_found.sum(), n_repeated + repeated.sum()
+    assert found > 0.7 * n_repeated
 
 
 def two_axes(*, repeated, seed):

@@ -3,6 +3,11 @@
 The residues of one mode over sensors and excited DOFs are a product of two vectors. Where two modes share a pole, the
 fit finds one pole whose residues are the sum of two such products. They are told apart only up to a rotation, as any
 two modes of a repeated root are; the two that are given agree at the driving points.
+
+A second product may also be what the noise, or gains of FRFs that differ (a tilted sensor, a hammer beside its point),
+leave. Both have a size that all modes share. With its prior, that of a second product being as large as the mode, the
+evidence of rank one and of rank two of each mode follows (MacKay 2003, eq. 28.10: each number that is free costs the
+ratio of its range and its error), and the sizes are marginalised on a grid, weighed by what all modes say of them.
 """
 
 from __future__ import annotations
@@ -12,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg, sparse
+from scipy.special import softmax
 
 from frf_ipz.identification.results.shapes import product_factors
 from frf_ipz.identification.root_covariance import RootCovariance, pair_blocks
@@ -19,9 +25,13 @@ from frf_ipz.modes import modal_phase_collinearity
 from frf_ipz.numerics.low_rank_fit import fit_products
 
 if TYPE_CHECKING:
-    from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+    from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.identification.modal_fit import ModalFit
 
+RARE = 0.02  # modes that share their frequency with another, before anything is measured
+BEYOND_DOUBT = 0.99  # probability of the second mode
+NOISES = np.array([1.0, 2.0, 4.0])  # times the stated deviation, where errors are larger than what is known of them
+GAINS = np.array([0.0, 0.002, 0.008, 0.03, 0.12])  # by which FRFs may differ, over that: as much as is met, and nothing
 REMARK = "one of two modes at this frequency: its residues have rank two"
 
 
@@ -52,7 +62,7 @@ def with_repeated_roots(fit: ModalFit) -> ModalFit:
     variance[:, rows, columns] = np.trace(fit.residue_covariance, axis1=2, axis2=3) * np.abs(factors) ** 2
     if not products.all():  # an FRF of zeros is no measurement: it has no error, and would weigh without bounds
         return fit
-    repeated = _of_rank_two(products, variance, len(fit.frequency_hz))
+    repeated = np.flatnonzero(_probability_of_rank_two(products, variance) > BEYOND_DOUBT)
     driving = [(outputs.index(dof), inputs.index(dof)) for dof in outputs if dof in inputs]
     for mode in repeated[::-1].tolist():
         two = np.stack([part[rows, columns] for part in _two_products(products[mode], driving)])
@@ -60,25 +70,29 @@ def with_repeated_roots(fit: ModalFit) -> ModalFit:
     return fit
 
 
-def _of_rank_two(products: ComplexArray, variance: FloatArray, n_lines: int) -> IntArray:
-    """Find modes whose second product exceeds the noise of each entry, and what others have, as the BIC demands."""
+def _probability_of_rank_two(products: ComplexArray, variance: FloatArray) -> FloatArray:
+    """Probability of each mode to be two, (n_modes,), errors of gains and of noise being of any size that all share."""
     n_outputs, n_inputs = products.shape[1:]
-    weights = 1 / np.maximum(variance, np.finfo(float).tiny)
-    one, two = (_misfits(products, weights, rank) for rank in (1, 2))
-    total = np.sum(weights * np.abs(products) ** 2, axis=(1, 2))
-    relative = one / total
-    others = [
-        float(np.median(np.delete(relative, mode))) if len(relative) > 1 else 0.0 for mode in range(len(relative))
-    ]
-    level = np.maximum(1.0, np.array(others) * total / ((n_outputs - 1) * (n_inputs - 1)))
-    demanded = 2 * (n_outputs + n_inputs - 2) * np.log(2 * n_lines)
-    return np.flatnonzero(2 * (one - two) / level > demanded)
+    squares = np.abs(products) ** 2
+    by_row, by_column = squares.sum(axis=2, keepdims=True), squares.sum(axis=1, keepdims=True)
+    expected = by_row * by_column / squares.sum(axis=(1, 2), keepdims=True)
+    total = variance + GAINS[:, None, None, None] ** 2 * expected
+    n_left = [(n_outputs - rank) * (n_inputs - rank) for rank in (1, 2)]
+    log_error, log_size = np.log(total).mean(axis=(2, 3)), np.log(squares.mean(axis=(1, 2)))
+    one, two = (
+        -_misfits(np.broadcast_to(products, total.shape), 1 / total, rank) / NOISES[:, None, None] ** 2
+        - left * (log_error + 2 * np.log(NOISES[:, None, None]))
+        for rank, left in zip((1, 2), n_left, strict=True)
+    )
+    one, two = np.log(1 - RARE) + one, np.log(RARE) + two - (n_left[0] - n_left[1]) * log_size
+    either = np.logaddexp(one, two)
+    return np.asarray(np.tensordot(softmax(either.sum(axis=2)), np.exp(two - either), 2))
 
 
 def _misfits(matrices: ComplexArray, weights: FloatArray, rank: int) -> FloatArray:
     """Weighted sum of squares that products leave of each matrix."""
     rows, columns = fit_products(matrices, weights, rank)
-    return np.asarray(np.sum(weights * np.abs(matrices - rows @ columns.mT) ** 2, axis=(1, 2)))
+    return np.asarray(np.sum(weights * np.abs(matrices - rows @ columns.mT) ** 2, axis=(-2, -1)))
 
 
 def _two_products(matrix: ComplexArray, driving: list[tuple[int, int]]) -> list[ComplexArray]:
