@@ -78,7 +78,10 @@ def pair_roots(fit: ModalFit, reduced_model: ReducedModel) -> Pairs:
     for frf, zeros in enumerate(model_zeros(reduced_model, fit.labels, limit_rad_s=limit)):
         zero_pairing = pair_zeros(fit, frf, zeros, paired_poles, float(pole_pairing.gains[frf]))
         rows += _zero_rows(fit, frf, zeros, zero_pairing, paired_poles, zero_std)
-    return Pairs(rows=tuple(rows), labels=fit.labels, warnings=tuple(_warnings(rows, pole_pairing, fit.labels)))
+    elastic = poles.values[reduced_model.rigid.shape[1] :]
+    on_springs = float(np.abs(elastic[0])) if reduced_model.rigid.size and len(elastic) else 0.0
+    texts = _warnings(rows, pole_pairing, fit.labels, on_springs)
+    return Pairs(rows=tuple(rows), labels=fit.labels, warnings=tuple(texts))
 
 
 def sure_partners(pairing: PolePairing) -> dict[int, int]:
@@ -226,15 +229,21 @@ def _paired_logs(rows: list[Pair]) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def _warnings(rows: list[Pair], pairing: PolePairing, labels: Sequence[FrfLabel]) -> list[str]:
+def _warnings(rows: list[Pair], pairing: PolePairing, labels: Sequence[FrfLabel], on_springs_rad_s: float) -> list[str]:
+    """Say what could not be paired; below ``on_springs_rad_s`` a free model has rigid-body modes only."""
     texts = []
     poles = [row for row in rows if row.kind == "pole"]
-    unpaired = [row for row in poles if row.verdict is PairVerdict.MISSING_IN_MODEL]
-    if unpaired:
-        where = ", ".join(f"{abs(row.measured_value) / (2 * np.pi):.4g}" for row in unpaired)
-        texts.append(
-            f"the model has no counterpart of the measured modes at {where} Hz: something may be missing in it"
-        )
+    unpaired = [abs(row.measured_value) for row in poles if row.verdict is PairVerdict.MISSING_IN_MODEL]
+    reasons = {
+        "it is free, and a structure on its suspension has such modes": [
+            size for size in unpaired if size < on_springs_rad_s
+        ],
+        "something may be missing in it": [size for size in unpaired if size >= on_springs_rad_s],
+    }
+    for reason, sizes in reasons.items():
+        if sizes:
+            where = ", ".join(f"{size / (2 * np.pi):.4g}" for size in sizes)
+            texts.append(f"the model has no counterpart of the measured modes at {where} Hz: {reason}")
     if not any(row.verdict is PairVerdict.PAIRED for row in poles):
         texts.append("no measured mode could be paired: check units, materials and supports of the FE model")
     flipped = np.flatnonzero(pairing.gains < 0)

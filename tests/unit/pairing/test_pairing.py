@@ -145,6 +145,16 @@ def test_a_mode_that_the_model_lacks_is_reported_and_is_no_target():
     assert len(pairs.targets) == 5
 
 
+def test_modes_of_a_suspension_are_told_from_what_is_missing():
+    free = chain(free=True)
+    free = replace(free, rigid=np.full((5, 1), 1 / np.sqrt(free.mass.sum())))
+    hung = replace(free, stiffness=free.stiffness + np.diag([2.0, 0.0, 0.0, 0.0, 2.0]) * 1e2, rigid=np.zeros((0, 0)))
+    warnings = pair_roots(measured(hung, zeros=False), free).warnings
+    assert len(warnings) == 1
+    assert "suspension" in warnings[0]
+    assert "missing" not in warnings[0]
+
+
 def test_nothing_in_common_is_a_warning_with_what_to_check():
     model = chain()
     far = replace(model, stiffness=1e6 * model.stiffness)
