@@ -361,6 +361,7 @@ def _warnings(
         delays = {
             str(label.output_channel or label.output_dof): delay_s
             for label, delay_s in zip(frfs.labels, fitted.delay_s, strict=True)
+            if delay_s
         }
         listed = ", ".join(f"{channel} {1e3 * delay_s:+.4g} ms" for channel, delay_s in delays.items())
         texts.append(

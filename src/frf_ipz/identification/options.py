@@ -118,7 +118,7 @@ class FitOptions:
         Tolerances of the stabilisation diagram. They are for whoever looks at it: the fit does not use them.
     delay : bool, optional
         true: fit a pure delay for each output channel too; false: none. Without it a delay that all responses share is
-        tried, and taken where it explains most of what normal modes leave.
+        tried, and taken where it explains most of what normal modes leave, and then one of each channel by itself.
     gain : tuple of str
         Channels whose constant gain is not known and is estimated; all others are trusted. A gain shows only where two
         FRFs must be equal but for gains: with excitation and sensor exchanged, or recorded by two channels.

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from frf_ipz.identification.fit import fit_modes
+from frf_ipz.identification.likelihood.delay import find_delays
+from frf_ipz.identification.likelihood.smooth_terms import smooth_terms_of_band
+from frf_ipz.identification.measured_lines import measured_lines
 from frf_ipz.identification.options import FitOptions
 from frf_ipz.identification.search.find_modes import find_modes
 from frf_ipz.ingest.estimate import estimate_frfs
@@ -76,3 +79,39 @@ def test_one_late_sensor_of_three_is_named():
     np.testing.assert_allclose(fit.model.delay_s, late_s, rtol=0, atol=1e-6)
     assert any("each by its own delay" in text for text in fit.warnings)
     np.testing.assert_allclose(fit.modes["frequency_hz"], truth.frequency_hz, rtol=1e-5, atol=0)
+
+
+def late_frfs(late_s, *, complexity=0.0):
+    """Give FRFs of four sensors, some of them late, with modes that are complex by chance."""
+    truth = random_modes([44.0, 108.0, 187.5, 296.0], 0.007, n_outputs=4, n_inputs=1, seed=4)
+    frfs = accelerances(truth, np.arange(40, 861) * 0.5, noise=3e-4, seed=4)
+    s, size = frfs.s[:, None], complexity * np.sqrt(np.mean(np.abs(truth.residues()) ** 2, axis=1))
+    turned = np.random.default_rng(4).standard_normal((4, 4)) * size[:, None]
+    turns = 1 / (s - truth.poles) + 1 / (s - truth.poles.conj())
+    return replace(frfs, values=(frfs.values + s**2 * (turns @ turned)) * np.exp(-s * np.array(late_s)))
+
+
+@pytest.mark.parametrize("late_s", [(0.0, 0.0, 1.8e-3, 0.0), (-6e-4, -6e-4, 0.0, 0.0), (0.0, 0.0, 0.0, 5e-5)])
+def test_short_delays_of_some_sensors_are_told_by_their_phases(late_s):
+    fit = fit_modes(late_frfs(late_s))
+    np.testing.assert_allclose(fit.model.delay_s, late_s, rtol=0, atol=5e-7)
+    assert ((fit.model.delay_s != 0) == (np.array(late_s) != 0)).all()
+    assert any("each by its own delay" in text for text in fit.warnings)
+
+
+@pytest.mark.parametrize("complexity", [0.0, 0.02, 0.1])
+def test_complex_modes_are_no_delays(complexity):
+    assert not fit_modes(late_frfs((0.0,) * 4, complexity=complexity)).model.delay_s.any()
+
+
+@pytest.mark.parametrize("frequency_hz", [(258.4, 302.6, 332.8, 368.6), (121.1, 265.0, 319.2, 363.0)])
+def test_the_best_delay_is_found_between_those_of_a_coarse_grid(frequency_hz):
+    for seed in range(8):
+        truth = random_modes(frequency_hz, 0.007, n_outputs=4, n_inputs=1, seed=seed)
+        frfs = accelerances(truth, np.arange(40, 861) * 0.5, noise=3e-4, seed=seed)
+        late_s = np.array([1.8e-3, -2.1e-3, 0.0, 6.2e-3])
+        lines = measured_lines(replace(frfs, values=frfs.values * np.exp(-frfs.s[:, None] * late_s)), FitOptions())
+        data = lines.weighted(shared=True).with_real_modes()
+        terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(3)
+        found_s, _ = find_delays(data, truth.poles, terms, np.arange(4))
+        np.testing.assert_allclose(found_s, late_s, rtol=0, atol=1e-6)

@@ -1,10 +1,10 @@
 """Pure delays of output channels, as filters and converters cause them.
 
 Poles held, the best delay is where residues and smooth terms explain the most of ``exp(s delay) y``. Delays and
-residues act very differently over a band of several modes, so a grid that is refined, and a parabola through its
-last points, find it. Where the best of the grid is at its end, it goes on beyond. What the columns have in common with
-``exp(s delay) y`` is no faster in the delay than the highest line: few delays of a grid are computed, and the others
-interpolated.
+residues act very differently over a band of several modes, so a grid that is refined where parabolas through its points
+are highest, and one through its last points, find it. Where the best of the grid is at its end, it goes on beyond. What
+the columns have in common with ``exp(s delay) y`` is no faster in the delay than the highest line: few delays of a grid
+are computed, and the others interpolated.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from frf_ipz.identification.measured_lines import WeightedLines
 
 EARLIEST, LATEST = -1.0, 3.0  # periods of the highest frequency
-STEPS = 81
+STEPS = 321
 FINER = 0.1  # of the step, each time the grid is refined
 REFINEMENTS = 5
 ERROR = 1e-10  # of a wave between the delays that are computed
@@ -92,7 +92,7 @@ class _Explained:
 
     def at(self, delays: FloatArray) -> FloatArray:
         """Sum of squares of what is explained at each of a grid's delays, (n_delays,)."""
-        middle, reach = (delays[-1] + delays[0]) / 2, (delays[-1] - delays[0]) / 2
+        middle, reach = (delays[-1] + delays[0]) / 2, abs(delays[-1] - delays[0]) / 2
         n_nodes = nodes_for_waves(float(self.omega[-1] * reach), ERROR)
         weights = interpolation((delays - middle) / reach, n_nodes)
         products = weights @ self._products(middle + reach * chebyshev_nodes(n_nodes))
@@ -114,6 +114,15 @@ class _Explained:
         return total.reshape(len(self.U), len(delays), n_frfs).swapaxes(0, 1).reshape(len(delays), -1)
 
 
+def _tops(values: FloatArray) -> FloatArray:
+    """Raise values that are larger than both neighbours to the top of the parabola through the three."""
+    before, at, after = values[:-2], values[1:-1], values[2:]
+    tops, is_local = values.copy(), (at > before) & (at >= after)
+    bend = np.where(is_local, before - 2 * at + after, -1.0)
+    tops[1:-1] -= np.where(is_local, (before - after) ** 2 / (8 * bend), 0.0)
+    return tops
+
+
 def _best_delay(explained: _Explained, period: float, longest: float) -> tuple[float, float]:
     grid = np.linspace(EARLIEST, LATEST, STEPS) * period
     step = float(grid[1] - grid[0])
@@ -123,6 +132,7 @@ def _best_delay(explained: _Explained, period: float, longest: float) -> tuple[f
         grid, values = np.append(grid, beyond), np.append(values, explained.at(beyond))
         order = np.argsort(grid)
         grid, values = grid[order], values[order]
+    best = int(np.argmax(_tops(values)))
     for _ in range(REFINEMENTS - 1):
         grid = grid[best] + step * np.linspace(-1, 1, 11)
         values = explained.at(grid)

@@ -4,6 +4,16 @@ Complex residues follow a short delay almost exactly: they give good poles and n
 do not: a delay turns the phase of each mode in proportion to its frequency. So a delay is what makes modes look normal.
 A delay that all FRFs share is tried where modes are not normal, and taken where it explains most of that, in all FRFs
 together and in most of the modes by themselves: mode shapes that are truly complex turn one mode forth, another back.
+
+A delay of one channel is told from complex modes by the phases at that channel alone. With q the part of a residue that
+normal modes do not have, over its modulus, random phases of variance v + (variance of q by the noise) leave
+
+    F = sum_k (q_k^2 without the delay - q_k^2 with it) / (v + var q_k)
+
+distributed as Fisher's F of 1 and n - 1 degrees of freedom, v from what the delay leaves ([Paule1982], Eq. (8)).
+
+[Paule1982]: R. C. Paule, J. Mandel, Consensus values and weighting factors, J. Res. NBS 87 (1982) 377-385
+(doi:10.6028/jres.087.022).
 """
 
 from __future__ import annotations
@@ -13,11 +23,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import special
+from scipy import optimize, special
 
-from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.identification.likelihood.compression import column_gains, compress, model_columns
-from frf_ipz.identification.likelihood.delay import find_delays
+from frf_ipz.identification.likelihood.delay import EARLIEST, LATEST, find_delays
 from frf_ipz.identification.likelihood.sandwich import NoiseInTime
 from frf_ipz.identification.measured_lines import MeasuredLines, WeightedLines
 from frf_ipz.numerics.partial_fractions import stacked, unstacked
@@ -29,6 +39,10 @@ if TYPE_CHECKING:
 ROUNDS = 2  # of finding delays and poles in turn
 MOST = 0.5  # of the misfit, and of the modes
 FEWEST_MODES = 3  # whose phases tell a delay from complex modes
+FALSE_CLAIM = 1e-3  # chance that random phases of any channel are taken for a delay
+PATTERNS = (
+    2  # of phases that differ, in each period of the highest frequency that delays are tried over: q repeats by pi
+)
 CHANCE = 0.05  # that delays of FRFs, which are the same, differ so much that the deviation is raised
 
 
@@ -106,6 +120,71 @@ def explains_misfit(labels: Sequence[FrfLabel], lines: MeasuredLines, poles: Com
     delays, _ = find_delays(data.with_real_modes(), poles, terms, numbers)
     late = lines.advanced(delays).weighted(shared=True)
     return _misfit(late, poles, terms) < MOST * _misfit(data, poles, terms)
+
+
+def late_channels(
+    labels: Sequence[FrfLabel], lines: MeasuredLines, poles: ComplexArray, terms: SmoothTerms
+) -> FloatArray:
+    """Find channels whose modes are normal but for a delay of their own.
+
+    Parameters
+    ----------
+    labels : sequence of FrfLabel
+        Of the FRFs.
+    lines : MeasuredLines
+        Lines, weighted by the noise.
+    poles : (n_poles,) complex array
+        Of the fit, rad/s.
+    terms : SmoothTerms
+        Terms for modes out of band.
+
+    Returns
+    -------
+    (n_frfs,) array
+        Their delays, s; 0 for all other channels.
+    """
+    numbers = _channel_numbers(labels)
+    delays = np.zeros(len(labels))
+    in_band = (np.abs(poles) >= np.abs(lines.s[0])) & (np.abs(poles) <= np.abs(lines.s[-1]))
+    if not numbers.any() or np.count_nonzero(in_band) < FEWEST_MODES:
+        return delays
+    complex_modes = lines.weighted(shared=True)
+    left, least = (compress(data, poles, terms).misfit for data in (complex_modes.with_real_modes(), complex_modes))
+    by_number = float(np.log(2 * len(lines.s)))
+    not_normal = np.bincount(numbers, left - least) > np.bincount(numbers) * len(poles) * by_number
+    if not not_normal.any():
+        return delays
+    found, _ = find_delays(complex_modes.with_real_modes(), poles, terms, numbers)
+    late = lines.advanced(found).weighted(shared=True)
+    (before, _), (after, variance) = (_turns(data, poles, terms, in_band) for data in (complex_modes, late))
+    chance = FALSE_CLAIM / (len(not_normal) * PATTERNS * (LATEST - EARLIEST))
+    for channel in np.flatnonzero(not_normal):
+        frfs = numbers == channel
+        if _is_explained(*(parts[:, frfs].ravel() for parts in (before, after, variance)), chance):
+            delays[frfs] = found[frfs]
+    return delays
+
+
+def _turns(
+    data: WeightedLines, poles: ComplexArray, terms: SmoothTerms, modes: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Give the part of each residue that normal modes do not have, over its modulus, and its variance by the noise."""
+    system = compress(data, poles, terms)
+    gains = column_gains(system, [[system.n_smooth + number] for number in range(len(poles))])[modes]
+    residues = system.residues()[modes]
+    turn = residues.real / np.abs(residues)
+    return turn, turn**2 / gains
+
+
+def _is_explained(before: FloatArray, after: FloatArray, variance: FloatArray, chance: float) -> bool:
+    """Tell whether a delay takes off more than chance does off random phases that scatter as much as is left."""
+    spare = len(after) - 1
+
+    def excess(own: float) -> float:
+        return float(np.sum(after**2 / (own + variance))) - spare
+
+    own = 0.0 if excess(0.0) <= 0 else optimize.brentq(excess, 0.0, float(np.sum(after**2)) / spare)
+    return bool(np.sum((before**2 - after**2) / (own + variance)) > special.fdtri(1, spare, 1 - chance))
 
 
 def _channel_numbers(labels: Sequence[FrfLabel]) -> IntArray:

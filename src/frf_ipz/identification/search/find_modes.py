@@ -41,6 +41,7 @@ from frf_ipz.identification.search.delays import (
     common_delay,
     each_delay,
     explains_misfit,
+    late_channels,
     measure_delay,
 )
 from frf_ipz.identification.search.discrepancy import with_discrepancy
@@ -176,7 +177,10 @@ def find_modes(
         return late
     if late is not None and np.median(late.misfit_ratio) < LATE_MISFIT * np.median(fitted.misfit_ratio):
         fitted = late
-    if options.delay is None and LATE_MISFIT * _rms(fitted.misfit_ratio) > 1:  # at least the noise is left
+    if options.delay is not None:
+        return fitted
+    fitted = _without_late_channels(frfs, lines, fitted, options)
+    if LATE_MISFIT * _rms(fitted.misfit_ratio) > 1:  # at least the noise is left
         return _fit_delayed_channels(frfs, fitted, options) or fitted
     return fitted
 
@@ -253,12 +257,21 @@ def _fit_delayed_channels(frfs: FrfSet, fitted: FittedModes, options: FitOptions
     return replace(delayed, has_delayed_channels=True)
 
 
-def _fit_advanced(frfs: FrfSet, delay: CommonDelay, options: FitOptions) -> FittedModes:
-    """Fit without a delay, from the first poles on: those of late responses describe the delay as well."""
-    advanced = replace(frfs, values=frfs.values * np.exp(frfs.s[:, None] * delay.delay_s))
+def _without_late_channels(frfs: FrfSet, lines: MeasuredLines, fitted: FittedModes, options: FitOptions) -> FittedModes:
+    """Fit anew without the delays of channels whose modes are normal but for these."""
+    weighed = replace(lines.advanced(fitted.delay_s), variance=fitted.noise)
+    own_s = late_channels(frfs.labels, weighed, fitted.fit.poles, fitted.terms)
+    if not own_s.any():
+        return fitted
+    delay_s = fitted.delay_s + own_s
+    return replace(_fit_advanced(frfs, delay_s, options), has_delayed_channels=True)
+
+
+def _fit_advanced(frfs: FrfSet, delay_s: FloatArray, options: FitOptions) -> FittedModes:
+    """Fit without delays, from the first poles on: those of late responses describe the delay as well."""
+    advanced = replace(frfs, values=frfs.values * np.exp(frfs.s[:, None] * delay_s))
     without = replace(options, delay=False)
-    fitted = _find_modes(advanced, measured_lines(advanced, without), without, silent)
-    return replace(fitted, delay_s=np.full(frfs.n_frfs, delay.delay_s), common_delay=delay)
+    return replace(_find_modes(advanced, measured_lines(advanced, without), without, silent), delay_s=delay_s)
 
 
 def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progress: Progress) -> FittedModes:
@@ -287,7 +300,7 @@ def _find_modes(frfs: FrfSet, lines: MeasuredLines, options: FitOptions, progres
         weighed = replace(fitted.lines, receptance=lines.receptance, variance=fitted.noise)
         delay = common_delay(weighed, fitted.fit.poles, terms, find_poles)
         if delay is not None:
-            return _fit_advanced(frfs, delay, options)
+            return replace(_fit_advanced(frfs, np.full(frfs.n_frfs, delay.delay_s), options), common_delay=delay)
     if np.median(fitted.misfit_ratio) > MODEL_ERROR:
         progress(0.55, "adding and dropping poles by the model error")
         with suppress(NoModesError):  # where the model error hides them all, those of the noise alone are what there is
