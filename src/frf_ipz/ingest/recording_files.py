@@ -16,6 +16,7 @@ from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.ingest.formats.registry import open_recording
 from frf_ipz.ingest.formats.time_stamps import resolution_of
 from frf_ipz.ingest.signals.alignment import AGREES, Alignment, align, join
+from frf_ipz.ingest.signals.windows import noise_decays
 from frf_ipz.ingest.units import is_stated, sensitivity_factor, unit_factor, unit_ratio
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ BUDGET = 64_000_000  # bytes of recordings that are cached
 UNIFORM = 0.01  # of the median step: the contract's limit for a step that differs
 FEWEST_SAMPLES = 16
 NOTHING_LEFT = -math.log(np.finfo(np.float64).eps)  # time constants after which a window is less than a double's digit
+WINDOWED_FORCE = "the applied window is taken back from the force too, as its noise decays with the window"
 
 
 @dataclass(kw_only=True)
@@ -170,10 +172,15 @@ class RecordingFiles:
         else:
             blocks = iter([self._read_both(setup, setup.second_recorder, path)])
         start_s: float | None = None
+        first = 2  # column that the window is on
         for block in blocks:
-            if self.test.applied_window_s is not None:
-                start_s = block[0, 0] if start_s is None and len(block) else start_s
-                _take_back_window(path, block, start_s or 0.0, self.test.applied_window_s)
+            if self.test.applied_window_s is not None and len(block):
+                if start_s is None:
+                    start_s = block[0, 0]
+                    if noise_decays(block[:, 1], (block[:, 0] - start_s) / self.test.applied_window_s):
+                        first = 1
+                        self._notes.setdefault(WINDOWED_FORCE, {})[path] = None
+                _take_back_window(path, block[:, first:], block[:, 0] - start_s, self.test.applied_window_s)
             yield block
 
     def _read_file(
@@ -307,16 +314,16 @@ class UniformTimeCheck:
             raise FileFormatError(self._path, problem)
 
 
-def _take_back_window(path: Path, block: FloatArray, start_s: float, time_constant_s: float) -> None:
-    """Divide the responses by the exponential window that an analyser has put on them, 1 at the first sample."""
-    exponent = (block[:, 0] - start_s) / time_constant_s
-    if len(exponent) and exponent[-1] > NOTHING_LEFT:
+def _take_back_window(path: Path, signals: FloatArray, time_s: FloatArray, time_constant_s: float) -> None:
+    """Divide signals by the exponential window that an analyser has put on them, 1 at the first sample."""
+    exponent = time_s / time_constant_s
+    if exponent[-1] > NOTHING_LEFT:
         problem = (
-            f"after {block[-1, 0] - start_s:.4g} s an exponential window of {time_constant_s:g} s has left nothing; "
+            f"after {time_s[-1]:.4g} s an exponential window of {time_constant_s:g} s has left nothing; "
             "state the time constant that the analyser shows, in s, and cut recordings of several impacts apart"
         )
         raise FileFormatError(path, problem, where="[test] applied_exponential_window_s")
-    block[:, 2:] *= np.exp(exponent)[:, None]
+    signals *= np.exp(exponent)[:, None]
 
 
 def _time_factor(recording: RawRecording) -> float:

@@ -50,12 +50,13 @@ def test_an_exponential_window_is_taken_back_exactly(tmp_path):
     assert errors(result, structure).max() < EXACT
 
 
-def windowed_campaign(folder, structure, time_constant_s):
-    """Write recordings as an analyser does that has put an exponential window on the responses alone."""
+def windowed_campaign(folder, structure, time_constant_s, *, first=1, force_noise=0.0):
+    """Write recordings as an analyser does that has put an exponential window on the responses alone, or on all."""
     step_s = 1 / 2048
     for number, height in enumerate((100.0, 60.0, 150.0), start=1):
         signals = impact(structure, height=height)
-        signals[1:] *= np.exp(-np.arange(signals.shape[1]) * step_s / time_constant_s)
+        signals[0] += force_noise * np.random.default_rng(number).standard_normal(signals.shape[1])
+        signals[first:] *= np.exp(-np.arange(signals.shape[1]) * step_s / time_constant_s)
         write_csv(folder / "hits" / f"p7_{number:02d}.csv", signals, step_s, start_s=5.0)
     return lambda head: write_test(folder, HIT, n_outputs=structure.n_outputs, head=head)
 
@@ -67,6 +68,15 @@ def test_a_window_that_the_analyser_has_applied_is_taken_back(tmp_path):
     assert stated.frfs.window_decay_1_s == 0.0
     assert errors(stated, structure).max() < EXACT
     assert errors(estimate(write("")), structure).max() > 0.2  # peaks that the window has widened
+
+
+@pytest.mark.parametrize("first", [0, 1], ids=["on the force too", "on responses alone"])
+def test_whether_a_window_was_on_the_force_shows_in_its_noise(tmp_path, first):
+    structure = Structure()
+    write = windowed_campaign(tmp_path, structure, 0.4, first=first, force_noise=1e-3)
+    stated = estimate(write("applied_exponential_window_s = 0.4"))
+    assert np.median(errors(stated, structure)) < 1e-3
+    assert any("from the force too" in note for note in stated.choices) == (first == 0)
 
 
 def test_a_window_after_which_nothing_is_left_is_refused(tmp_path):

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 TAPER = 0.25  # of the length of the interval, at each end, outside of it
 SHORTEST_TAPER = 4  # samples
+PARTS = 16  # of a signal whose levels of noise are compared: more than a pulse fills, and enough for a trend
 HANN_HALF_OVERLAP = 1.0 / 18.0  # twice the squared correlation of segments that overlap by half, [Welch1967]
 
 
@@ -59,6 +60,44 @@ def taper_length(start: int, stop: int) -> int:
         Samples on each side.
     """
     return max(SHORTEST_TAPER, int(TAPER * (stop - start)))
+
+
+def noise_decays(signal: FloatArray, exponent: FloatArray) -> bool:
+    """Tell whether the noise of a signal decays as under an exponential window, rather than staying the same.
+
+    Parameters
+    ----------
+    signal : (n_samples,) array
+        A force: a short pulse, and noise.
+    exponent : (n_samples,) array
+        Minus the logarithm of the window.
+
+    Returns
+    -------
+    bool
+        Of levels in equal parts of the signal, the logarithms scatter less with the window taken off; false where
+        most parts hold no noise.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).standard_normal(1024)
+    >>> exponent = np.linspace(0, 2, 1024)
+    >>> noise_decays(noise, exponent), noise_decays(noise * np.exp(-exponent), exponent)
+    (False, True)
+    """
+    count = len(signal) // PARTS * PARTS
+    bends = np.diff(signal[:count], 2, prepend=0.0, append=0.0)  # offsets and slow drifts are no noise
+    levels = np.median(bends.reshape(PARTS, -1) ** 2, axis=1)
+    is_noise = levels > 0.0
+    if np.count_nonzero(is_noise) <= PARTS / 2:
+        return False
+    steady = np.log(levels[is_noise])
+    windowed = steady + 2 * np.mean(exponent[:count].reshape(PARTS, -1), axis=1)[is_noise]
+    return bool(_scatter(windowed) < _scatter(steady))
+
+
+def _scatter(values: FloatArray) -> float:
+    return float(np.mean(np.abs(values - np.median(values))))
 
 
 def exponential_window(n_samples: int, step_s: float, decay_1_s: float, origin: int) -> FloatArray:
