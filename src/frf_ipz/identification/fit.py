@@ -63,6 +63,7 @@ if TYPE_CHECKING:
 else:
     pd = import_late("pandas")
 
+FRFS_SHOWN = 6
 NOISE_ROUNDS = 3  # of fitting residues and estimating the noise in turn
 
 
@@ -336,9 +337,18 @@ def _warnings(
     if np.median(ratio) > MODEL_ERROR:
         noise = "of the recordings" if fitted.lines.known.all() else "that differs from line to line"
         texts.append(
-            f"the misfit is {np.median(ratio):.2g} times the noise {noise} (median FRF; {ratio.max():.2g} at worst): "
+            f"the misfit is {np.median(ratio):.2g} times the noise {noise} (median FRF; {ratio.max():.2g} at worst, in "
+            f"{frfs.labels[int(np.argmax(ratio))]}): "
             "no linear model with these modes describes the structure to within the noise, so standard deviations are "
             "taken from the misfit"
+        )
+    elif (ratio > MODEL_ERROR).any():
+        worst_first = [int(frf) for frf in np.argsort(-ratio) if ratio[frf] > MODEL_ERROR]
+        listed = ", ".join(f"{frfs.labels[frf]} {ratio[frf]:.3g}" for frf in worst_first[:FRFS_SHOWN])
+        texts.append(
+            f"the fit misses {counted(len(worst_first), 'FRF')} of {len(ratio)} by more than noise, times the noise: "
+            f"{listed}{', ...' if len(worst_first) > FRFS_SHOWN else ''}; they count by their misfit, and their "
+            "residues and zeros have its deviations: look at these sensors and records"
         )
     if halves is not None and halves.scatter > 1:
         texts.append(

@@ -294,6 +294,21 @@ def test_errors_are_as_large_as_stated(case):
     assert 0.8 < errors_over_std(lambda signals: signals, **case) < 1.3
 
 
+def test_the_noise_of_the_force_is_no_less_than_each_record_shows():
+    """Lines share it: the scatter of three impacts tells its power by two or three numbers in a band."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        clean = impact(Structure(), height=100.0, length_s=3e-3, at_s=0.06)
+        noise = np.array([[0.05], [1e-4], [1e-4]])
+        records = [clean + noise * rng.standard_normal(clean.shape) for _ in range(3)]
+        one, three = (frf_ipz.estimate_frfs(in_memory(part, step_s=STEP_S)).frfs for part in (records[:1], records))
+        band = three.in_band((20.0, 200.0))
+        relative = three.variance[band] / np.abs(three.values[band]) ** 2
+        of_one_record = one.variance[band] / np.abs(one.values[band]) ** 2
+        ratio = relative / (of_one_record / 3)
+        assert ratio.min() > 0.5  # one record tells its noise to some 15 %, and its own force enters
+
+
 @pytest.mark.parametrize("share", [0.05, 0.33, 0.7])
 def test_errors_of_late_records_are_stated(share):
     """The missing part is taken from the falling flank: right to within a factor of two to three."""

@@ -36,6 +36,7 @@ from frf_ipz.identification.measured_lines import (
 )
 from frf_ipz.identification.noise import smooth_level, squared_differences
 from frf_ipz.identification.search.arrivals import find_arrivals
+from frf_ipz.identification.search.candidates import find_candidates
 from frf_ipz.identification.search.delays import (
     CommonDelay,
     common_delay,
@@ -479,16 +480,22 @@ def _refine_with_final_weights(
     if not lines.known.all():
         lines = with_misfit_noise(lines, goodness.misfit / data.weight)
     final = replace(lines.weighted(), real_modes=data.real_modes)
-    if not (lines.known.all() and final.is_shared and fit.has_converged):  # otherwise the search has done it
-        fit = refine_poles(final, fit.poles, terms)
+
+    def refine(data: WeightedLines, poles: ComplexArray) -> tuple[RefinedPoles, GoodnessOfFit]:
+        nonlocal decisions
+        fit = refine_poles(data, poles, terms)
         noise_is_known = bool(lines.known.all())
         while True:  # what the search believed by its own weights
-            rest, goodness, dropped = drop_insignificant(final, fit, terms, options, noise_is_known=noise_is_known)
+            rest, goodness, dropped = drop_insignificant(data, fit, terms, options, noise_is_known=noise_is_known)
             if not dropped:
                 break
             decisions += dropped
-            fit = refine_poles(final, rest.poles, terms)
+            fit = refine_poles(data, rest.poles, terms)
         _require_modes(lines, fit.poles)
+        return fit, goodness
+
+    if not (lines.known.all() and final.is_shared and fit.has_converged):  # otherwise the search has done it
+        fit, goodness = refine(final, fit.poles)
     misfit_ratio, noise, noise_from = misfit_over_noise(goodness, fit), lines.variance, "recordings"
     if model_limits or not lines.known.all() or np.median(misfit_ratio) > MODEL_ERROR:
         noise_from = "misfit"
@@ -499,6 +506,12 @@ def _refine_with_final_weights(
         goodness = goodness.of_poles(assessed, fit.poles)
         if np.isfinite(lower).any():  # correlation shows in what is left over its own size
             goodness = replace(goodness, candidates=assess_fit(weighed, fit, terms).candidates)
+    elif (missed := misfit_ratio > MODEL_ERROR).any():
+        for _ in range(NOISE_ROUNDS):  # what is missed draws the poles less each time
+            lines = _with_missed_frfs(replace(lines, variance=noise), fit, terms, missed)
+            fit, goodness = refine(replace(lines.weighted(), real_modes=data.real_modes), fit.poles)
+        misfit = np.abs(lines.receptance - response(fit.system, terms, lines.s)) ** 2 / noise
+        misfit_ratio = np.sqrt(np.sum(misfit, axis=0) / (len(misfit) - fit.system.n_linear / 2))
     return FittedModes(
         lines=lines,
         terms=terms,
@@ -513,6 +526,18 @@ def _refine_with_final_weights(
         decisions=decisions,
         delay_s=delay_s,
     )
+
+
+def _with_missed_frfs(lines: MeasuredLines, fit: RefinedPoles, terms: SmoothTerms, missed: BoolArray) -> MeasuredLines:
+    """Weigh FRFs that the fit of all misses by what it leaves, and by how alike that is over the width of a mode."""
+    misfit = lines.receptance - response(fit.system, terms, lines.s)
+    variance = lines.variance.copy()
+    squares = np.maximum(misfit_square(lines, misfit), variance)
+    for frf in np.flatnonzero(missed):
+        over_level = misfit[:, [frf]] * np.sqrt(2 / squares[:, [frf]])
+        alike = find_candidates(lines.frequency_hz, over_level, 0).level_at(fit.poles)
+        variance[:, frf] = squares[:, frf] * np.max(alike, initial=1.0)
+    return replace(lines, variance=variance)
 
 
 def _variance_below_model_error(lines: MeasuredLines, goodness: GoodnessOfFit, fit: RefinedPoles) -> FloatArray:

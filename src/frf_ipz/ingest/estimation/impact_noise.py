@@ -170,7 +170,9 @@ def impact_variance(sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray
     with np.errstate(divide="ignore", invalid="ignore"):  # lines without force become NaN
         power, scaled = sums.force.T, (noise.scaled_force / sums.force).T
         unequal = (counts - 1) * scaled / (noise.scales.T - scaled)
-        scatter = frf_variance(sums) * power * np.where(counts < 3, 1.0, unequal)
+        scatter = (
+            frf_variance(sums, force_noise=(noise.force.T / counts).T) * power * np.where(counts < 3, 1.0, unequal)
+        )
         measured = noise.response.T + noise.force.T * gain
         unexplained = np.where(sums.counts == 1, measured, scatter)
         unexplained += gain * (noise.force.T / counts) * (noise.force.T / power)

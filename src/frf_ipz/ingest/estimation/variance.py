@@ -14,7 +14,9 @@ from frf_ipz.ingest.estimation.spectra import SpectrumSums, estimate_frf, unexpl
 from frf_ipz.ingest.signals.scatter import ROUNDING, fit_noise_power
 
 
-def frf_variance(sums: SpectrumSums, independent: FloatArray | None = None) -> FloatArray:
+def frf_variance(
+    sums: SpectrumSums, independent: FloatArray | None = None, force_noise: FloatArray | None = None
+) -> FloatArray:
     """Estimate the variance of H1 from the scatter between records.
 
     Parameters
@@ -23,6 +25,9 @@ def frf_variance(sums: SpectrumSums, independent: FloatArray | None = None) -> F
         Of all records.
     independent : (n_outputs,) array, optional
         How many independent ones those of each response are worth, where they overlap.
+
+    force_noise : (n_outputs, n_lines) array, optional
+        Noise power of the force in one record, where it was measured.
 
     Returns
     -------
@@ -38,7 +43,10 @@ def frf_variance(sums: SpectrumSums, independent: FloatArray | None = None) -> F
     for output in np.flatnonzero(sums.counts >= 2):
         scatter = unexplained[:, output] / (degrees[output] * share[output])
         power[:, output] = fit_noise_power(
-            np.maximum(scatter, floors[output]), gains[:, output], float(degrees[output])
+            np.maximum(scatter, floors[output]),
+            gains[:, output],
+            float(degrees[output]),
+            None if force_noise is None else force_noise[output],
         )
     return power_to_variance(power * share, sums.force)
 

@@ -35,7 +35,9 @@ OUTLIERS = 1e-3  # lines of an FRF that may stick out by chance
 ROUNDING = 1e-24  # of the responses' power: below this, scatter is rounding
 
 
-def fit_noise_power(scatter: FloatArray, gain: FloatArray, degrees: float) -> FloatArray:
+def fit_noise_power(
+    scatter: FloatArray, gain: FloatArray, degrees: float, known_force: FloatArray | None = None
+) -> FloatArray:
     """Fit a + b |H|^2, with a and b smooth, to the scatter of one FRF.
 
     Parameters
@@ -46,6 +48,9 @@ def fit_noise_power(scatter: FloatArray, gain: FloatArray, degrees: float) -> Fl
         |H|^2.
     degrees : float
         Degrees of freedom of each line: complex, so records less one.
+    known_force : (n_lines,) array, optional
+        What is known of b: it is no less. Noise of a force that is kept for a short time is alike on all lines of a
+        band, which then tell its power hardly better than one line does.
 
     Returns
     -------
@@ -59,7 +64,11 @@ def fit_noise_power(scatter: FloatArray, gain: FloatArray, degrees: float) -> Fl
     used = np.ones_like(scatter)
     power = np.empty_like(scatter)
     for _ in range(2):
-        response, force = _fit_bands(scatter[bands], gain[bands], weights * used[bands])
+        kept = weights * used[bands]
+        response, force = _fit_bands(scatter[bands], gain[bands], kept)
+        if known_force is not None:
+            least = np.sum(kept * known_force[bands], axis=1) / np.maximum(kept.sum(axis=1), np.finfo(float).tiny)
+            response, force = _with_least_force(scatter[bands], gain[bands], kept, (response, force), least)
         band_power = response[:, None] + force[:, None] * gain[bands]
         power = np.asarray(np.bincount(bands.ravel(), (weights * band_power).ravel(), len(scatter)), np.float64)
         used = (scatter <= limit * power).astype(float)
@@ -111,6 +120,23 @@ def _fit_bands(scatter: FloatArray, gain: FloatArray, weights: FloatArray) -> tu
         if np.all(change <= TOLERANCE * (response + force + tiny)):
             break
     return response, force / mean_gain
+
+
+def _with_least_force(
+    scatter: FloatArray,
+    gain: FloatArray,
+    weights: FloatArray,
+    fitted: tuple[FloatArray, FloatArray],
+    least: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Raise b of the bands to what it is at least, and take a from what that leaves of the scatter."""
+    response, force = fitted
+    raised = np.maximum(force, least)
+    by_force = raised[:, None] * gain
+    weight = weights / np.maximum(response[:, None] + by_force, np.finfo(float).tiny) ** 2
+    total = np.maximum(weight.sum(axis=1), np.finfo(float).tiny)
+    left = np.maximum(np.sum(weight * (scatter - by_force), axis=1) / total, 0.0)
+    return np.where(raised > force, np.minimum(left, response), response), raised
 
 
 def _fit_positive(weight: FloatArray, gain: FloatArray, scatter: FloatArray) -> tuple[FloatArray, FloatArray]:
