@@ -34,7 +34,7 @@ def errors_over_std(seed, spoil):
     ids=["more noise than is stated", "a gain that wavers"],
 )
 def test_an_frf_that_the_fit_misses_is_named_and_has_the_deviations_of_its_misfit(spoil):
-    for seed in (2, 3):
+    for seed in (1, 2):  # of the first a factor common to all FRFs was made
         poles, of_bad, of_others, warnings = errors_over_std(seed, spoil)
         for errors in (poles, of_bad, of_others):
             assert np.sqrt(np.mean(errors**2)) < 2.0

@@ -206,9 +206,14 @@ def _without_force_error(
     beyond_noise = goodness.drops * share_beyond_known_noise(search.data, fit, search.terms)[:, None]
     is_noise = (over_bic(beyond_noise, 2 * len(search.data.s)) < 1) & ~_is_pinned(search, fit.poles)
     doubts = np.where(is_noise, np.inf, _doubts(search, fit, goodness))
-    # on lines where the model does not follow to the noise, its level takes the place of the noise: one for all FRFs
-    level = np.exp(np.log(goodness.level).mean(axis=1))
-    weighed = replace(search.data, profile=search.data.profile / np.sqrt(level))
+    # where the model does not follow to the noise, its level takes the place of the noise: of the lines, and of the FRFs
+    level = np.log(goodness.level) / 2
+    of_frfs = level.mean(axis=0) - level.mean()  # one that is missed is no error of all
+    weighed = replace(
+        search.data,
+        profile=search.data.profile / np.exp(level.mean(axis=1)),
+        gain=search.data.gain / np.exp(of_frfs),
+    )
     found = _error_beside_best_poles(search, weighed, fit, goodness, doubts)  # without what is noise
     if found is None:
         return fit, goodness
