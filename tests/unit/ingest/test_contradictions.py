@@ -294,6 +294,36 @@ def test_errors_are_as_large_as_stated(case):
     assert 0.8 < errors_over_std(lambda signals: signals, **case) < 1.3
 
 
+def struck_beside(offsets, *, seed):
+    """Estimate from impacts whose FRFs are off as if they were struck beside their point, each by its own offset."""
+    rng = np.random.default_rng(seed)
+    right, turned = Structure(), Structure(shapes=((0.6, -0.8, 0.9), (0.5, 0.7, -0.4)))
+    records = []
+    for offset in offsets:
+        height = rng.uniform(60, 150)
+        beside = impact(turned, height=height)
+        clean = impact(right, height=height) + offset * np.vstack([0 * beside[:1], beside[1:]])
+        records.append(clean + np.array([[0.02], [0.02], [0.02]]) * rng.standard_normal(clean.shape))
+    result = frf_ipz.estimate_frfs(in_memory(records, step_s=STEP_S))
+    band = result.frfs.in_band((10.0, 400.0))
+    error = result.frfs.values[band] - right.accelerance(result.frfs.s[band])
+    return result, float(np.sqrt(np.mean(np.abs(error) ** 2 / result.frfs.variance[band])))
+
+
+def test_impacts_that_are_two_groups_are_named_and_their_deviations_take_either_for_right():
+    for wrong in ((0, 2, 5), (0, 2, 4, 5)):
+        result, errors = struck_beside([0.04 * (number in wrong) for number in range(7)], seed=3)
+        assert result.records.used.all()
+        assert any("two groups" in text and "output 1" in text for text in result.warnings)
+        assert 0.5 < errors < 1.3  # 1.4 to 2.6 by the scatter
+
+
+def test_impacts_that_scatter_about_their_point_are_no_groups():
+    for seed in range(4):
+        offsets = 0.05 * np.random.default_rng(seed).standard_normal(7)
+        assert not any("two groups" in text for text in struck_beside(offsets, seed=seed)[0].warnings)
+
+
 def test_the_noise_of_the_force_is_no_less_than_each_record_shows():
     """Lines share it: the scatter of three impacts tells its power by two or three numbers in a band."""
     for seed in range(3):

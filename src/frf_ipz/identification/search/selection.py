@@ -206,7 +206,7 @@ def _without_force_error(
     beyond_noise = goodness.drops * share_beyond_known_noise(search.data, fit, search.terms)[:, None]
     is_noise = (over_bic(beyond_noise, 2 * len(search.data.s)) < 1) & ~_is_pinned(search, fit.poles)
     doubts = np.where(is_noise, np.inf, _doubts(search, fit, goodness))
-    # where the model does not follow to the noise, its level takes the place of the noise: of the lines, and of the FRFs
+    # where the model does not follow to the noise, its level is that of the noise: of the lines, and of FRFs
     level = np.log(goodness.level) / 2
     of_frfs = level.mean(axis=0) - level.mean()  # one that is missed is no error of all
     weighed = replace(

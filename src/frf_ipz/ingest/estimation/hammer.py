@@ -90,6 +90,7 @@ def _add_noise(
     force_noise = noise_power(record.force[record.trigger :], record.step_s, frequency_hz)
     noise.force[rows] += weights * force_noise * np.sum(window**2)
     noise.scales[rows] += scales
+    noise.doubts[rows] += np.array(info.doubts)[rows, None] if info.doubts else 1.0
     noise.scaled_force[rows] += scales * weights * force**2
     noise.pulse[rows] += force * spectrum * np.exp(2j * np.pi * frequency_hz * record.trigger * record.step_s)
     if any(info.missing_force):

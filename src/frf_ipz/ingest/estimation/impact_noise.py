@@ -55,6 +55,8 @@ class ImpactNoise:
         Squared modulus of the force times the relative noise power s of the impact.
     scales : (n_outputs, 1) array
         Relative noise powers s.
+    doubts : (n_outputs, 1) array
+        Factors on the variance by the scatter: more than 1 where the impacts are two groups.
     missing_force : (n_outputs, n_lines) complex array
         What the record lacks of the force, times the conjugate of what it holds.
     missing_response : (n_outputs, n_lines) array
@@ -67,6 +69,7 @@ class ImpactNoise:
     force: FloatArray
     scaled_force: FloatArray
     scales: FloatArray
+    doubts: FloatArray
     missing_force: ComplexArray
     missing_response: FloatArray
     pulse: ComplexArray
@@ -102,7 +105,7 @@ def empty_noise(n_lines: int, n_outputs: int) -> ImpactNoise:
     ImpactNoise
         Zeros.
     """
-    lengths = {field.name: 1 if field.name == "scales" else n_lines for field in fields(ImpactNoise)}
+    lengths = {field.name: 1 if field.name in ("scales", "doubts") else n_lines for field in fields(ImpactNoise)}
     complex_sums = ("missing_force", "pulse")
     zeros = {name: np.zeros((n_outputs, n), complex if name in complex_sums else float) for name, n in lengths.items()}
     return ImpactNoise(**zeros)
@@ -170,9 +173,8 @@ def impact_variance(sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray
     with np.errstate(divide="ignore", invalid="ignore"):  # lines without force become NaN
         power, scaled = sums.force.T, (noise.scaled_force / sums.force).T
         unequal = (counts - 1) * scaled / (noise.scales.T - scaled)
-        scatter = (
-            frf_variance(sums, force_noise=(noise.force.T / counts).T) * power * np.where(counts < 3, 1.0, unequal)
-        )
+        scatter = frf_variance(sums, force_noise=(noise.force.T / counts).T) * power
+        scatter *= np.where(counts < 3, 1.0, unequal) * (noise.doubts.T / counts)
         measured = noise.response.T + noise.force.T * gain
         unexplained = np.where(sums.counts == 1, measured, scatter)
         unexplained += gain * (noise.force.T / counts) * (noise.force.T / power)

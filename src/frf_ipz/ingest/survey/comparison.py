@@ -18,6 +18,7 @@ from frf_ipz.ingest.survey.contradictions import (
     contradicts_pairwise,
     difference_of_pair,
     find_dead,
+    find_two_groups,
     follows_force,
     leave_out,
     weigh_impacts,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.recording_files import RecordingFiles
-    from frf_ipz.ingest.survey.contradictions import OutputComparison
+    from frf_ipz.ingest.survey.contradictions import OutputComparison, TwoGroups
     from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
 
 CONTRADICTS = "contradicts the other impacts"
@@ -37,6 +38,9 @@ OPPOSITE = "its sign is the opposite"
 UNNAMED = ""
 DEAD = "is dead: nothing in it follows the force"
 ADVICE = "which is right does not show in two: drop the wrong one by [ingest] drop, or record a third"
+GROUP_ADVICE = (
+    "which is right does not show: drop the wrong ones by [ingest] drop; deviations take either for as likely"
+)
 DISAGREE = 0.12  # of the FRF, 1 dB: two impacts that differ by more are no repetition; what is explained to this, is
 LITTLE = 0.5  # of the usual weight: less is said
 FEWEST_LINES = 64  # that are compared, however many impacts there are: a band of the scatter's fit
@@ -57,7 +61,7 @@ def compare_impacts(files: RecordingFiles, survey: Survey) -> tuple[tuple[Record
     records : tuple of RecordInfo
         All of the survey, with what contradicts as faults, and the relative noise of each.
     warnings : tuple of str
-        Where two impacts contradict each other, and nothing tells which is right.
+        Where two impacts, or two groups of them, contradict each other, and nothing tells which is right.
     """
     changed: dict[str, RecordInfo] = {}
     warnings: list[str] = []
@@ -70,9 +74,9 @@ def compare_impacts(files: RecordingFiles, survey: Survey) -> tuple[tuple[Record
         changed |= {record.name: record for record in records}
         if len(records) == 2:
             compared, undecided = _compare_pair(files, survey, records, spectra)
-            warnings += undecided
         else:
-            compared = _compare_setup(files, survey, records, spectra)
+            compared, undecided = _compare_setup(files, survey, records, spectra)
+        warnings += undecided
         changed |= {record.name: record for record in compared}
     return tuple(changed.get(record.name, record) for record in survey.records), tuple(warnings)
 
@@ -142,7 +146,7 @@ def _without_dead(
 
 def _compare_setup(
     files: RecordingFiles, survey: Survey, records: Sequence[RecordInfo], spectra: ImpactSpectra
-) -> list[RecordInfo]:
+) -> tuple[list[RecordInfo], list[str]]:
     columns = [channel.column for channel in files.test.output_channels]
     comparisons = [_compare_output(files, survey, records, spectra, output) for output in range(len(columns))]
     causes = [_name_causes(columns, spectra, comparisons, impact) for impact in range(len(records))]
@@ -157,13 +161,34 @@ def _compare_setup(
                     unlike.add((impact, output))
                 named[output] = f"{CONTRADICTS}: {explained or _difference(spectra, comparison, (impact, output))}"
     agree = [() if comparison is None else comparison.agreeing for comparison in comparisons]
-    return [
+    found = {
+        impacts: find_two_groups(spectra, [output for output, same in enumerate(agree) if same == impacts], impacts)
+        for impacts in dict.fromkeys(agree)
+    }
+    groups = [found[impacts] for impacts in agree]
+    doubts = tuple(1.0 if pair is None else pair.variance_factor for pair in groups)
+    compared = [
         replace(
             _with_causes(record, causes[impact], columns),
             is_unlike=all((impact, output) in unlike for output in record.used_outputs),
+            doubts=doubts,
         )
         for impact, record in enumerate(_weighed(files, survey, records, spectra, agree))
     ]
+    return compared, _say_groups(columns, records, groups)
+
+
+def _say_groups(columns: Sequence[str], records: Sequence[RecordInfo], groups: Sequence[TwoGroups | None]) -> list[str]:
+    """Say which impacts fall into two groups: once for all responses in which these are the same."""
+    texts = []
+    for found in dict.fromkeys(pair for pair in groups if pair is not None):
+        first, second = (", ".join(records[number].name for number in group) for group in (found.first, found.second))
+        listed = ", ".join(column for column, pair in zip(columns, groups, strict=True) if pair is found)
+        texts.append(
+            f"{first} and {second} are two groups, as if struck at two points: their FRFs differ by "
+            f"{100 * found.between:.2g} % in {listed}, those of a group by {100 * found.within:.2g} %; {GROUP_ADVICE}"
+        )
+    return texts
 
 
 def _weighed(

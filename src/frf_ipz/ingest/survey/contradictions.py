@@ -11,6 +11,11 @@ the level is added, and the next is tried.
 An impact in which a response does not stand out of its noise, though by the FRF of those in which it does it should,
 holds nothing of it (a plug that came loose) and is no part of a majority.
 
+Impacts that agree may still be two groups (some struck at another point): the scatter counts on errors of its own in
+each, and is too small by far. Along the direction in which their FRFs scatter most, every split with two or more on
+either side is tried; what is between groups over what is within one is an F distribution with 1 and c - 2 degrees of
+freedom where there are none and the errors of an impact are one real number: how far beside the point it was struck.
+
 A reversed sensor explains an impact if the other sign makes D as small as that of the others: the ratio of the
 densities of D with and without must exceed the number of explanations over the level.
 """
@@ -25,13 +30,20 @@ import numpy as np
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.ingest.signals.scatter import ROUNDING, fit_noise_power
 from frf_ipz.ingest.survey.noise_weights import noise_weights
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from scipy import special
+else:
+    special = import_late("scipy.special")
+
 CUT_OFF = 1e-3  # of a mode's amplitude at the end of a record that is worth no window
 LEVEL = 1e-3  # probability that a test without faults loses anything
+GROUPS_BY_CHANCE = 0.01  # the same of two groups, which are said, while nothing is left out
 FEWEST = 3  # impacts of which one can be told from the majority
+FEWEST_OF_GROUP = 2  # impacts that are alike and unlike the others
 FEWEST_WEIGHED = 2  # impacts whose noise can be compared
 PASSES = 3  # of the weights
 STANDS_OUT = 2.0  # times the power of the noise, median over the lines: there is as much signal as noise
@@ -348,6 +360,90 @@ def _noise_scales(force: ComplexArray, response: ComplexArray) -> FloatArray:
     normal = matrix.T @ matrix + np.eye(len(force)) / shares.shape[1]
     scales = np.maximum(1.0 + np.linalg.solve(normal, matrix.T @ beyond), 0.0)
     return np.asarray(scales) if scales.any() else ones
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TwoGroups:
+    """Impacts that fall into two groups.
+
+    Parameters
+    ----------
+    first, second : tuple of int
+        The impacts of each.
+    between, within : float
+        How far the groups' FRFs, and those of impacts of one group, are apart: root of mean square, relative, lines
+        weighed by their noise.
+    """
+
+    first: tuple[int, ...]
+    second: tuple[int, ...]
+    between: float
+    within: float
+
+    @property
+    def variance_factor(self) -> float:
+        """What makes the variance of the mean, by the scatter of all, that of a mean of which either group is right."""
+        n, m = len(self.first), len(self.second)
+        return (n**2 + m**2) / 2 * (n + m - 1) / (n * m)
+
+
+def find_two_groups(spectra: ImpactSpectra, outputs: Sequence[int], impacts: Sequence[int]) -> TwoGroups | None:
+    """Find two groups among impacts that agree, whose FRFs differ by far more than those within a group.
+
+    Parameters
+    ----------
+    spectra : ImpactSpectra
+        All impacts.
+    outputs : sequence of int
+        Responses in which just these agree.
+    impacts : sequence of int
+        Those that agree.
+
+    Returns
+    -------
+    TwoGroups or None
+        None where there are none.
+    """
+    count, chosen = len(impacts), list(impacts)
+    if count < 2 * FEWEST_OF_GROUP:
+        return None
+    frfs, weights = zip(*(_frfs_over_noise(spectra, output, chosen) for output in outputs), strict=True)
+    values, weight = np.hstack(frfs), np.concatenate(weights)
+    errors = (values - values.mean(axis=0)) * weight
+    products = (errors @ errors.conj().T).real
+    order = np.argsort(np.linalg.eigh(products)[1][:, -1])
+    total = float(np.trace(products))
+    splits = []
+    for n_first in range(FEWEST_OF_GROUP, count - FEWEST_OF_GROUP + 1):
+        first = order[:n_first]
+        between = products[np.ix_(first, first)].sum() * count / (n_first * (count - n_first))
+        splits.append((total - float(between), n_first))
+    left, n_first = min(splits)
+    spare = count - 2
+    ratio = (total - left) * spare / left if left > 0.0 else np.inf
+    n_splits = 2.0 ** (count - 1) - 1 - count  # with two or more on either side
+    if special.fdtrc(1, spare, ratio) * n_splits > GROUPS_BY_CHANCE:
+        return None
+    groups = [tuple(sorted(chosen[place] for place in group)) for group in (order[:n_first], order[n_first:])]
+    size = float(np.sum(np.abs(values.mean(axis=0) * weight) ** 2))
+    part = count / (n_first * (count - n_first))  # of what is between groups, over the square of how far they are apart
+    return TwoGroups(
+        first=min(groups),
+        second=max(groups),
+        between=float(np.sqrt((total - left) * part / size)),
+        within=float(np.sqrt(left / spare / size)),
+    )
+
+
+def _frfs_over_noise(spectra: ImpactSpectra, output: int, impacts: list[int]) -> tuple[ComplexArray, FloatArray]:
+    """Give the FRF of each impact, (n_impacts, n_used), and one over the deviation of its noise, (n_used,)."""
+    force, response = spectra.force[impacts], spectra.responses[impacts, output]
+    noise = spectra.noise[impacts, output].mean(axis=0)
+    noise = noise + spectra.force_noise[impacts].mean() * np.abs(_estimate_h1(force, response)) ** 2
+    noise = noise + ROUNDING * np.sum(np.abs(response) ** 2, axis=0).max(initial=0.0)
+    used = (np.abs(force) > 0.0).all(axis=0) & (noise > 0.0)
+    power = np.mean(np.abs(force[:, used]) ** 2, axis=0)
+    return response[:, used] / force[:, used], np.sqrt(power / noise[used])
 
 
 def contradicts_pairwise(spectra: ImpactSpectra, output: int) -> bool:

@@ -90,6 +90,7 @@ def _with_noise(record: RecordInfo, compared: RecordInfo) -> RecordInfo:
         record,
         noise_weights=compared.noise_weights,
         noise_scales=compared.noise_scales,
+        doubts=compared.doubts,
         remarks=tuple(dict.fromkeys((*record.remarks, *compared.remarks))),
     )
 

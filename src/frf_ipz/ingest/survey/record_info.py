@@ -80,6 +80,8 @@ class RecordInfo:
         the mean over the impacts is 1. Empty where they cannot be compared.
     noise_scales : tuple of float
         Noise power of each response over that of the other impacts, under these weights; empty as they are.
+    doubts : tuple of float
+        Factor on the variance of each response, where the impacts at its point are two groups; empty for 1.
     spikes : tuple of Spike
         Jumps in its responses that no band-limited motion makes, from `start`; they are taken off.
     period : int
@@ -123,6 +125,7 @@ class RecordInfo:
     lacks_most: bool = False
     noise_weights: tuple[tuple[float, ...], ...] = ()
     noise_scales: tuple[float, ...] = ()
+    doubts: tuple[float, ...] = ()
     spikes: tuple[Spike, ...] = ()
     period: int = 0
     steady_part: int = -1
