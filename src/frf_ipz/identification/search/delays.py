@@ -160,7 +160,7 @@ def late_channels(
     chance = FALSE_CLAIM / (len(not_normal) * PATTERNS * (LATEST - EARLIEST))
     for channel in np.flatnonzero(not_normal):
         frfs = numbers == channel
-        if _is_explained(*(parts[:, frfs].ravel() for parts in (before, after, variance)), chance):
+        if _is_explained(before[:, frfs].ravel(), after[:, frfs].ravel(), variance[:, frfs].ravel(), chance):
             delays[frfs] = found[frfs]
     return delays
 
