@@ -23,18 +23,23 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.identification.likelihood.compression import column_gains, compress, model_columns
 from frf_ipz.identification.likelihood.delay import EARLIEST, LATEST, find_delays
 from frf_ipz.identification.likelihood.sandwich import NoiseInTime
 from frf_ipz.identification.measured_lines import MeasuredLines, WeightedLines
+from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.partial_fractions import stacked, unstacked
 
 if TYPE_CHECKING:
+    from scipy.optimize import brentq
+
     from frf_ipz.frf import FrfLabel
     from frf_ipz.identification.likelihood.smooth_terms import SmoothTerms
+else:
+    brentq = import_late("scipy.optimize", "brentq")
 
 ROUNDS = 2  # of finding delays and poles in turn
 MOST = 0.5  # of the misfit, and of the modes
@@ -183,7 +188,7 @@ def _is_explained(before: FloatArray, after: FloatArray, variance: FloatArray, c
     def excess(own: float) -> float:
         return float(np.sum(after**2 / (own + variance))) - spare
 
-    own = 0.0 if excess(0.0) <= 0 else optimize.brentq(excess, 0.0, float(np.sum(after**2)) / spare)
+    own = 0.0 if excess(0.0) <= 0 else brentq(excess, 0.0, float(np.sum(after**2)) / spare)
     return bool(np.sum((before**2 - after**2) / (own + variance)) > special.fdtri(1, spare, 1 - chance))
 
 
