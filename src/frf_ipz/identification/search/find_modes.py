@@ -180,7 +180,7 @@ def find_modes(
         fitted = late
     if options.delay is not None:
         return fitted
-    fitted = _without_late_channels(frfs, lines, fitted, options)
+    fitted = _without_late_channels(frfs, fitted, options)
     if LATE_MISFIT * _rms(fitted.misfit_ratio) > 1:  # at least the noise is left
         return _fit_delayed_channels(frfs, fitted, options) or fitted
     return fitted
@@ -258,9 +258,11 @@ def _fit_delayed_channels(frfs: FrfSet, fitted: FittedModes, options: FitOptions
     return replace(delayed, has_delayed_channels=True)
 
 
-def _without_late_channels(frfs: FrfSet, lines: MeasuredLines, fitted: FittedModes, options: FitOptions) -> FittedModes:
+def _without_late_channels(frfs: FrfSet, fitted: FittedModes, options: FitOptions) -> FittedModes:
     """Fit anew without the delays of channels whose modes are normal but for these."""
-    weighed = replace(lines.advanced(fitted.delay_s), variance=fitted.noise)
+    lines = fitted.lines  # but for what was taken off for an error of the force or a drift
+    measured = frfs.values[lines.used] / lines.s[:, None] ** lines.powers
+    weighed = replace(lines, receptance=measured, variance=fitted.noise).advanced(fitted.delay_s)
     own_s = late_channels(frfs.labels, weighed, fitted.fit.poles, fitted.terms)
     if not own_s.any():
         return fitted
