@@ -60,6 +60,11 @@ def change_manifest(folder, change):
         path.write_text(json.dumps(manifest), encoding="utf-8")
 
 
+def column_of(fields, arrays, name):
+    """A column of numbers of the rows of a result."""
+    return arrays[fields["rows"]["columns"][name]["array"]]
+
+
 def change_tree(folder, stage, change):
     """Change what a stage's file says, and seal it again, as somebody would who means it."""
     path = stage_file(folder, stage)
@@ -302,13 +307,15 @@ for _stage, _name, _change in [
     ("ingest", "has_no_tables", lambda fields, _: fields.update(records={"frame": [], "rows": 0})),
     ("ingest", "has_a_long_name", lambda fields, _: fields.update(choices=["a" * 1_000_000])),
     ("ingest", "has_half_a_letter", lambda fields, _: fields.update(warnings=["\ud800 hit\udcff.csv"])),
-    ("pair", "points_beyond_the_end", lambda fields, _: [row["fields"].update(frf=999) for row in fields["rows"]]),
+    ("pair", "points_beyond_the_end", lambda fields, arrays: column_of(fields, arrays, "frf").fill(999)),
+    ("pair", "points_before_the_start", lambda fields, arrays: column_of(fields, arrays, "measured").fill(-9)),
+    ("pair", "has_an_unknown_choice", lambda fields, _: fields["rows"]["columns"]["verdict"][0].append("__init__")),
     (
         "pair",
-        "points_before_the_start",
-        lambda fields, _: [row["fields"].update(measured=-9) for row in fields["rows"]],
+        "has_an_unknown_text",
+        lambda fields, arrays: arrays[fields["rows"]["columns"]["verdict"][1]["array"]].fill(99),
     ),
-    ("pair", "has_an_unknown_choice", lambda fields, _: fields["rows"][0]["fields"].update(verdict="__init__")),
+    ("pair", "has_rows_beyond_memory", lambda fields, _: fields["rows"].update(rows=2**62)),
     ("update", "has_another_history", lambda fields, _: fields.update(history={"frame": [], "rows": 0})),
     ("update", "is_for_no_dofs", lambda fields, _: fields["model"]["fields"].update(dofs=[])),
     ("predict", "has_no_labels", lambda fields, _: fields.update(labels=[])),

@@ -16,6 +16,7 @@ from frf_ipz.assessment.causes.modal_comparison import computed_modes, measured_
 from frf_ipz.assessment.checks import agreement, counterparts, prediction, quality, shapes
 from frf_ipz.errors import NumericalError
 from frf_ipz.fe.eigen import solve_modes
+from frf_ipz.numerics.one_thread import on_one_thread
 
 if TYPE_CHECKING:
     from frf_ipz.assessment.assessment import LikelyCause
@@ -58,6 +59,7 @@ WITHOUT_FRFS: tuple[Ask, ...] = (
 MODES_BEYOND = 12  # of the model, besides twice the measured ones: a model that is too soft has more in the band
 
 
+@on_one_thread
 def assess(evidence: Evidence) -> Assessment:
     """Say whether the result of a run can be used.
 

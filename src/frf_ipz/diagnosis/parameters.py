@@ -13,6 +13,7 @@ from frf_ipz.diagnosis.result import Diagnosis
 from frf_ipz.errors import InputError
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.eigen import stated_damping_ratios
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.structure import ReducedModel, StructuralModel
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm
@@ -29,6 +30,7 @@ STEP = 1e-4  # of a value, for the difference of two models: matrices are nearly
 PRIOR = 0.1  # standard deviation of a value, relative: an update refines a diagnosis, and does not begin anew
 
 
+@on_one_thread
 def make_diagnosed_basis(
     diagnosis: Diagnosis,
     fe_model: StructuralModel,

@@ -18,6 +18,7 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.display import Concise
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.export.state_space import StateSpaceModel, from_control, to_control
+from frf_ipz.numerics.one_thread import on_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -97,6 +98,7 @@ class RigidBodyDecoupling(Concise):
         )
 
 
+@on_one_thread
 def decouple_rigid_body(
     system: control.StateSpace | StateSpaceModel, *, axes: Sequence[str] = ()
 ) -> RigidBodyDecoupling:

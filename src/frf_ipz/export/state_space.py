@@ -33,6 +33,7 @@ from frf_ipz.export.realization import (
 )
 from frf_ipz.export.sampling import discretise_with_delays
 from frf_ipz.frf import require_measured
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.updating.scale import MeasuredScale
 from frf_ipz.updating.updated_model import UpdatedModel
 
@@ -290,6 +291,7 @@ def to_state_space(
     return to_control(make_state_space(measured, updated_model, points=points, options=options, delays_s=delays_s))
 
 
+@on_one_thread
 def to_state_space_ensemble(
     measured: Measured,
     updated_model: UpdatedModel,

@@ -21,6 +21,7 @@ from frf_ipz.export.options import ExportOptions
 from frf_ipz.export.ports import choose_ports
 from frf_ipz.frf import FrfLabel, require_measured
 from frf_ipz.late_imports import import_late
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.prediction.ensemble import ModelEnsemble
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.updating.updated_model import UpdatedModel, UpdateStatus
@@ -100,6 +101,7 @@ class UncertaintyWeights(Concise):
         return tuple(control.tf(above, below) for above, below in zip(self.numerators, self.denominators, strict=True))
 
 
+@on_one_thread
 def estimate_uncertainty_weights(
     measured: Measured,
     updated_model: UpdatedModel,

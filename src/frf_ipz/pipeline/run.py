@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from frf_ipz import __version__
 from frf_ipz.arguments import as_path
 from frf_ipz.errors import InputError, did_you_mean
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.pipeline.chain import STAGES, chain
 from frf_ipz.pipeline.inputs import PipelineInputs, read_inputs
 from frf_ipz.progress import Progress, silent
@@ -101,6 +102,7 @@ def run_in_memory(
     return Results(memory)
 
 
+@on_one_thread
 def run_chain(
     inputs: PipelineInputs, store: RunStore, *, until: str, diagnosing: bool | None, progress: Progress
 ) -> None:

@@ -22,7 +22,7 @@ from frf_ipz.identification.modal_fit import ModalFit
 from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.prediction.advice import explain_wide_bands, wide_bands
 from frf_ipz.prediction.ensemble import ModelEnsemble
-from frf_ipz.prediction.model_error import as_ensemble, estimate_model_error, frf_rows, frf_sizes
+from frf_ipz.prediction.model_error import ModelError, as_ensemble, estimate_model_error, frf_rows, frf_sizes
 from frf_ipz.prediction.prediction import Prediction
 from frf_ipz.prediction.suspension import Suspension, find_suspension, on_suspension
 from frf_ipz.prediction.zeros import predicted_zeros
@@ -130,6 +130,7 @@ def _evaluate(model: ReducedModel, labels: Sequence[FrfLabel], s: ComplexArray) 
     return compute_frfs(model, labels, s) if labels else np.zeros((len(s), 0), complex)
 
 
+@on_one_thread
 def band_of_magnitudes(
     measured: Measured, updated_model: UpdatedModel, *, labels: Sequence[FrfLabel], s: ComplexArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -187,17 +188,17 @@ def band_of_magnitudes(
     return _magnitude_bands(measured, updated, _ensemble(updated, s), labels, s)
 
 
-_tested: WeakKeyDictionary[UpdatedModel, tuple[Measured, Suspension | None, UpdatedModel]] = WeakKeyDictionary()
+_hung: WeakKeyDictionary[UpdatedModel, tuple[Measured, tuple[Suspension, UpdatedModel] | None]] = WeakKeyDictionary()
 
 
 def _as_tested(measured: Measured, updated: UpdatedModel) -> tuple[Suspension | None, UpdatedModel]:
     """Give the updated model on the suspension that was measured, and what is known of it."""
-    known = _tested.get(updated)
+    known = _hung.get(updated)
     if known is None or known[0] is not measured:
         suspension = find_suspension(measured, updated)
-        hung = updated if suspension is None else on_suspension(updated, suspension)
-        known = _tested[updated] = measured, suspension, hung
-    return known[1:]
+        hung = None if suspension is None else (suspension, on_suspension(updated, suspension))
+        known = _hung[updated] = measured, hung
+    return known[1] or (None, updated)
 
 
 _ensembles: WeakKeyDictionary[UpdatedModel, ModelEnsemble] = WeakKeyDictionary()  # roots of all members cost the most
@@ -217,9 +218,7 @@ def _magnitude_bands(
 ) -> tuple[FloatArray, FloatArray]:
     bands = np.full((2, len(s), len(labels)), np.nan)
     if len(updated.ensemble):
-        error = None
-        if isinstance(measured, ModalFit) and measured.labels:
-            error = estimate_model_error(measured, updated, ensemble, s)
+        error = _model_error(measured, updated, ensemble, s)
         centre = as_ensemble(updated, ensemble.lowest_rad_s)
         sizes = frf_sizes(updated, labels, s, centre) if error is not None and labels else None
         gains, powers = np.abs(updated.scale.gains(tuple(labels))), np.array([label.quantity.power for label in labels])
@@ -232,6 +231,21 @@ def _magnitude_bands(
             values = values * gains[frfs] * np.stack(drawn, axis=1)[:, None]
             bands[:, lines, frfs] = np.quantile(np.abs(values), BAND, axis=0)
     return bands[0], bands[1]
+
+
+_errors: WeakKeyDictionary[UpdatedModel, tuple[ModalFit, ComplexArray, ModelError]] = WeakKeyDictionary()
+
+
+def _model_error(
+    measured: Measured, updated: UpdatedModel, ensemble: ModelEnsemble, s: ComplexArray
+) -> ModelError | None:
+    """Give what the model cannot express: that of before where a model is asked for other FRFs on the same lines."""
+    if not isinstance(measured, ModalFit) or not measured.labels:
+        return None
+    known = _errors.get(updated)
+    if known is None or known[0] is not measured or not np.array_equal(known[1], s):
+        known = _errors[updated] = measured, s, estimate_model_error(measured, updated, ensemble, s)
+    return known[2]
 
 
 def _receptances(

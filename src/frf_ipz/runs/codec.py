@@ -282,23 +282,58 @@ class _Fields(_Kind):
             raise TypeError(f"{kind} is no dataclass of this package, and no annotation of what can be kept")
         hints = get_type_hints(kind)
         self.kind = kind
-        self._kinds = {item.name: _kind(hints[item.name]) for item in fields(kind) if item.init}
+        self.kinds = {item.name: _kind(hints[item.name]) for item in fields(kind) if item.init}
         self._required = {
             item.name
             for item in fields(kind)
             if item.init and item.default is MISSING and item.default_factory is MISSING
         }
 
-    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+    def require(self, value: Any) -> None:
+        """Refuse what is no such dataclass."""
         if type(value) is not self.kind:
             raise TypeError(f"a stage's result holds a {type(value).__name__} in the place of a {self.kind.__name__}")
-        return {"fields": {name: kind.encode(getattr(value, name), arrays) for name, kind in self._kinds.items()}}
+
+    def named(self, items: Any) -> Any:
+        """Refuse what has not the fields of the dataclass."""
+        if items.keys() - self.kinds.keys() or self._required - items.keys():
+            raise _MisfitError(f"it has not the fields of {self.kind.__name__}")
+        return items
+
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        self.require(value)
+        return {"fields": {name: kind.encode(getattr(value, name), arrays) for name, kind in self.kinds.items()}}
 
     def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
-        items = node["fields"]
-        if items.keys() - self._kinds.keys() or self._required - items.keys():
-            raise _MisfitError(f"it has not the fields of {self.kind.__name__}")
-        return self.kind(**{name: self._kinds[name].decode(item, arrays) for name, item in items.items()})
+        items = self.named(node["fields"])
+        return self.kind(**{name: self.kinds[name].decode(item, arrays) for name, item in items.items()})
+
+
+class _Rows(_Kind):
+    """Any number of one dataclass, as columns: numbers as arrays, and each text once. There may be 100 000."""
+
+    def __init__(self, item: _Fields) -> None:
+        self._item = item
+
+    def encode(self, value: Any, arrays: list[NDArray[Any]]) -> Any:
+        if not isinstance(value, tuple | list):
+            raise TypeError(f"a stage's result holds a {type(value).__name__} in the place of a tuple")
+        for item in value:
+            self._item.require(item)
+        columns = {
+            name: _encode_values(kind, [getattr(item, name) for item in value], arrays)
+            for name, kind in self._item.kinds.items()
+        }
+        return {"rows": len(value), "columns": columns}
+
+    def decode(self, node: Any, arrays: dict[int, NDArray[Any]]) -> Any:
+        columns = self._item.named(node["columns"])
+        values = {name: _decode_values(self._item.kinds[name], column, arrays) for name, column in columns.items()}
+        if {len(column) for column in values.values()} - {node["rows"]} or (node["rows"] and not values):
+            raise _MisfitError("the columns of a table are not of one length")
+        return tuple(
+            self._item.kind(**dict(zip(values, row, strict=True))) for row in zip(*values.values(), strict=True)
+        )
 
 
 class _Union(_Kind):
@@ -388,7 +423,10 @@ def _kind(hint: Any) -> _Kind:
     if origin in {Union, UnionType}:
         return _Union(tuple(map(_kind, arguments)))
     if origin is tuple:
-        return _Tuple(_kind(arguments[0])) if arguments[1:] == (...,) else _FixedTuple(tuple(map(_kind, arguments)))
+        if arguments[1:] != (...,):
+            return _FixedTuple(tuple(map(_kind, arguments)))
+        item = _kind(arguments[0])
+        return _Rows(item) if isinstance(item, _Fields) else _Tuple(item)
     if origin is Mapping:
         return _Mapping(*map(_kind, arguments))
     return _Choice(hint) if isinstance(hint, type) and issubclass(hint, Enum) else _Fields(hint)
@@ -402,6 +440,45 @@ def _type_of(name: str) -> type:
     module, _, qualified = name.partition(":")  # of the table above, not of a file
     kind: type = getattr(import_module(module), qualified)
     return kind
+
+
+def _numbers() -> dict[_Kind, str]:
+    return {REAL: "<f8", INTEGER: "<i8", TRUTH: "|b1", COMPLEX: "<c16"}
+
+
+def _encode_values(kind: _Kind, values: list[Any], arrays: list[NDArray[Any]]) -> Any:
+    """Encode values of one kind, as few of them outside of arrays as there are texts."""
+    if kind is COMPLEX:
+        return ARRAY.encode(np.array(values, np.complex128), arrays)
+    encoded = [kind.encode(value, arrays) for value in values]
+    if kind in _numbers():
+        return ARRAY.encode(np.array(encoded, _numbers()[kind]), arrays)
+    if kind is not TEXT and not isinstance(kind, _Choice):
+        return encoded
+    places = {text: place for place, text in enumerate(dict.fromkeys(encoded))}
+    return [list(places), ARRAY.encode(np.array([places[text] for text in encoded], np.int64), arrays)]
+
+
+def _decode_values(kind: _Kind, node: Any, arrays: dict[int, NDArray[Any]]) -> list[Any]:
+    if kind in _numbers():
+        return _values_of(node, arrays, _numbers()[kind])
+    if kind is not TEXT and not isinstance(kind, _Choice):
+        return [kind.decode(item, arrays) for item in node]
+    texts, places = node
+    known = [kind.decode(text, arrays) for text in texts]
+    chosen = _values_of(places, arrays, "<i8")
+    if chosen and not 0 <= min(chosen) <= max(chosen) < len(known):
+        raise _MisfitError("a text was expected")
+    return [known[place] for place in chosen]
+
+
+def _values_of(node: Any, arrays: dict[int, NDArray[Any]], kind: str) -> list[Any]:
+    """Numbers of an array of one axis, as Python's own."""
+    column = ARRAY.decode(node, arrays)
+    if column.ndim != 1 or column.dtype != np.dtype(kind):
+        raise _MisfitError("a column of a table is of another kind")
+    values: list[Any] = column.tolist()
+    return values
 
 
 def _encode_column(series: Any, arrays: list[NDArray[Any]]) -> Any:

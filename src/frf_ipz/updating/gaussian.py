@@ -435,47 +435,36 @@ def _rounding(noise: TargetNoise, parts: Sequence[FloatArray], stds: FloatArray)
     return np.where(least > own, least, 0.0)
 
 
-def with_more_noise(linear: Linearised, noise: TargetNoise, datum: int) -> Linearised:
-    """Diagonalise the noise of one block of data again: that of the others is as it was.
+def with_more_noise(linear: Linearised, noise: TargetNoise, data: IntArray) -> Linearised:
+    """Diagonalise the noise of some blocks of data again: that of the others is as it was.
 
     Parameters
     ----------
     linear : Linearised
         The data, with combinations of the parameters that were found without slack.
     noise : TargetNoise
-        With more noise of a datum.
-    datum : int
-        Which one.
+        With more noise of some data.
+    data : (m,) int array
+        Which ones.
 
     Returns
     -------
     Linearised
         The same data under that noise; with less information the combinations hold all the more.
     """
-    blocks = zip(linear.blocks(), noise.parts(), strict=True)
-    rows, vectors, place, block = next(
-        (rows, vectors, place, block) for (rows, place, vectors), (_, block) in blocks if datum in place
-    )
-    units = linear.slack[place]
-    block = block + np.diag(linear.rounding[place])
-    values, new_vectors = np.linalg.eigh(block / np.outer(units, units))
-    joined = linear.joined.copy()
-    joined[rows] = new_vectors.T @ vectors @ linear.joined[rows]
-    level = linear.level.copy()
-    level[rows] = np.maximum(values, np.finfo(float).tiny)
-    changed = replace(
-        linear,
-        joined=joined,
-        level=level,
-        axes=tuple(new_vectors if axes is vectors else axes for axes in linear.axes),
-        sums=[],
-        latest=[],
-    )
+    joined, level, axes = linear.joined.copy(), linear.level.copy(), list(linear.axes)
     total = linear.products(1 / linear.level, np.ones(len(linear.bases)))
-    total -= _sum_of_products(linear.joined[rows], 1 / linear.level[rows])
-    total += _sum_of_products(joined[rows], 1 / level[rows])
-    changed.sums.append((1 / level, total))
-    return changed
+    blocks = zip(linear.blocks(), noise.parts(), strict=True)
+    for number, ((rows, place, vectors), (_, block)) in enumerate(blocks):
+        if not np.isin(place, data).any():
+            continue
+        units = linear.slack[place]
+        values, axes[number] = np.linalg.eigh((block + np.diag(linear.rounding[place])) / np.outer(units, units))
+        joined[rows] = axes[number].T @ vectors @ linear.joined[rows]
+        level[rows] = np.maximum(values, np.finfo(float).tiny)
+        total -= _sum_of_products(linear.joined[rows], 1 / linear.level[rows])
+        total += _sum_of_products(joined[rows], 1 / level[rows])
+    return replace(linear, joined=joined, level=level, axes=tuple(axes), sums=[(1 / level, total)], latest=[])
 
 
 def _sum_of_products(joined: FloatArray, weights: FloatArray) -> FloatArray:
@@ -615,8 +604,19 @@ def step_by_discrepancy(linear: Linearised, scales: FloatArray, factor: float) -
     return step, factor
 
 
-def most_contradicted(linear: Linearised, scales: FloatArray, limit: float, *, least: float = 0.0) -> int:
-    """Find the datum that all other data and the prior contradict most.
+def contradicted(
+    linear: Linearised,
+    scales: FloatArray,
+    *,
+    limit: float,
+    excluded_std: float,
+    most: int,
+    judged: BoolArray | None = None,
+) -> IntArray:
+    """Find the data that all others and the prior contradict: the worst first, then those that are without it.
+
+    With K the covariance of the data under noise and prior, datum i lies ``(K^-1 d)_i / (K^-1)_ii`` from what the
+    others predict, with the variance ``1 / (K^-1)_ii``; more noise of a datum changes ``K^-1`` by a matrix of rank one.
 
     Parameters
     ----------
@@ -626,38 +626,88 @@ def most_contradicted(linear: Linearised, scales: FloatArray, limit: float, *, l
         Standard deviations of the terms.
     limit : float
         Standard deviations from the prediction by the other data beyond which a datum is contradicted.
-    least : float
-        Data of a smaller modulus are ignored.
+    excluded_std : float
+        Standard deviation that a contradicted datum gets, so that the others are no longer judged by it.
+    most : int
+        At most so many.
+    judged : (n,) bool array, optional
+        Which data may be named; all where it is left out.
 
     Returns
     -------
-    int
-        Its index; -1 where none is beyond the limit.
+    (m,) int array
+        Their indices; none where none is beyond the limit.
     """
-    root, right = linear.information(scales, 0.0)
-    mean = cho_solve((root, False), right, check_finite=False)
-    weights = 1 / linear.level
-    weighted_error, explained = np.empty(len(weights)), np.empty(len(weights))
-    data, own = np.empty(len(weights)), np.empty(len(weights))
-    inverse_root = lapack.dtrtri(root)[0]
-    columns, factors = linear.joined[:, : linear.ends[-1]], linear.factors(scales)
-    error = weights * (linear.data - columns @ (factors * mean))
-    inverse_root *= factors[:, None]
-    first, seen = 0, np.zeros((0, len(mean)))
-    for rows, place, vectors in linear.blocks():
-        if rows.stop > first + len(seen):
-            first = rows.start
-            chunk = slice(first, max(rows.stop, first + ROWS_AT_ONCE))
-            seen = weights[chunk, None] * (columns[chunk] @ inverse_root)
-        mine = seen[rows.start - first : rows.stop - first]
-        weighted_error[place] = vectors @ error[rows]
-        explained[place] = np.sum((vectors @ mine) ** 2, axis=1)
-        own[place] = vectors**2 @ weights[rows]
-        data[place] = vectors @ linear.data[rows]
-    remaining = np.maximum(own - explained, np.finfo(float).tiny)
-    distance = np.where(np.abs(data) >= least, np.abs(weighted_error) / np.sqrt(remaining), 0.0)
-    worst = int(np.argmax(distance))
-    return worst if distance[worst] > limit else -1
+    inverse = _InverseCovariance.of(linear, scales)
+    weighted, own = inverse.weighted.copy(), inverse.diagonal.copy()
+    open_to = np.ones(len(own), bool) if judged is None else judged
+    found: list[int] = []
+    columns: list[FloatArray] = []
+    variance = excluded_std**2
+    while len(found) < min(most, len(own)):
+        distance = np.where(open_to, np.abs(weighted) / np.sqrt(own), 0.0)
+        worst = int(np.argmax(distance))
+        if not distance[worst] > limit:
+            break
+        column = inverse.column(worst)
+        for other in columns:
+            column -= other * other[worst]
+        found.append(worst)
+        columns.append(column * np.sqrt(variance / (1 + variance * own[worst])))
+        weighted -= columns[-1] * (columns[-1][worst] / own[worst] * weighted[worst])
+        rest = own[worst] / (1 + variance * own[worst])
+        own = np.maximum(own - columns[-1] ** 2, np.finfo(float).tiny)
+        own[worst] = rest
+    return np.array(found, int)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _InverseCovariance:
+    """``K^-1`` of the data: its diagonal, its product with the data, its columns."""
+
+    linear: Linearised
+    weights: FloatArray
+    factors: FloatArray
+    root: FloatArray
+    weighted: FloatArray
+    diagonal: FloatArray
+
+    @classmethod
+    def of(cls, linear: Linearised, scales: FloatArray) -> _InverseCovariance:
+        root, right = linear.information(scales, 0.0)
+        mean = cho_solve((root, False), right, check_finite=False)
+        weights, factors = 1 / linear.level, linear.factors(scales)
+        columns = linear.joined[:, : linear.ends[-1]]
+        error = weights * (linear.data - columns @ (factors * mean))
+        inverse_root = lapack.dtrtri(root)[0] * factors[:, None]
+        weighted, diagonal = np.empty((2, len(weights)))
+        first, seen = 0, np.zeros((0, len(mean)))
+        for rows, place, vectors in linear.blocks():
+            if rows.stop > first + len(seen):
+                first = rows.start
+                chunk = slice(first, max(rows.stop, first + ROWS_AT_ONCE))
+                seen = weights[chunk, None] * (columns[chunk] @ inverse_root)
+            explained = np.sum((vectors @ seen[rows.start - first : rows.stop - first]) ** 2, axis=1)
+            weighted[place] = vectors @ error[rows]
+            diagonal[place] = np.maximum(vectors**2 @ weights[rows] - explained, np.finfo(float).tiny)
+        return cls(linear=linear, weights=weights, factors=factors, root=root, weighted=weighted, diagonal=diagonal)
+
+    def column(self, datum: int) -> FloatArray:
+        """One column, (n,)."""
+        linear, weights = self.linear, self.weights
+        rows, at = next(
+            (rows, vectors[place == datum][0]) for rows, place, vectors in linear.blocks() if datum in place
+        )
+        columns = linear.joined[:, : linear.ends[-1]]
+        told = cho_solve(
+            (self.root, False), self.factors * (columns[rows].T @ (weights[rows] * at)), check_finite=False
+        )
+        turned = -weights * (columns @ (self.factors * told))
+        turned[rows] += weights[rows] * at
+        column = np.empty(len(weights))
+        for its_rows, place, vectors in linear.blocks():
+            column[place] = vectors @ turned[its_rows]
+        return column
 
 
 def draw_posterior(

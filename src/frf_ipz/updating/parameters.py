@@ -23,6 +23,7 @@ from frf_ipz.arguments import require_type
 from frf_ipz.arrays import BoolArray, FloatArray, require_shape
 from frf_ipz.display import Concise
 from frf_ipz.dofs import as_dofs
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.structure import ReducedModel, StructuralModel
 from frf_ipz.updating.regions import Region, reduced_regions, smooth_regions
@@ -261,6 +262,7 @@ def generic_basis(model: ReducedModel, *, std: float = GENERIC_STD_ALONE, common
     )
 
 
+@on_one_thread
 def make_structural_basis(
     fe_model: StructuralModel, reduced_model: ReducedModel, *, mass: bool = False, sensors: Sequence[AnyDof | str] = ()
 ) -> ParameterBasis:

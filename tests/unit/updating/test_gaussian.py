@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
 from frf_ipz.updating.gaussian import (
+    contradicted,
     distance_to_optimum,
     draw_posterior,
     linearise,
-    most_contradicted,
     most_likely_scales,
     solve_step,
     step_by_discrepancy,
@@ -233,21 +233,32 @@ def test_slack_stays_where_data_agree():
     assert step_by_discrepancy(linear, np.ones(1), 0.7)[1] == 0.7
 
 
+def contradictions(linear, limit, *, std=10.0, most=4):
+    return contradicted(linear, np.ones(1), limit=limit, excluded_std=std, most=most).tolist()
+
+
 def test_the_most_contradicted_datum_is_found():
     sensitivity, noise = np.ones((5, 1)), 1e-4 * np.eye(5)
     data = np.array([1.0, 1.01, 3.0, 0.99, 1.0])
-    assert most_contradicted(linearise([sensitivity], data, noise_of(noise)), np.ones(1), 6.0) == 2
+    assert contradictions(linearise([sensitivity], data, noise_of(noise)), 6.0) == [2]
     data[2] = 1.0
-    assert most_contradicted(linearise([sensitivity], data, noise_of(noise)), np.ones(1), 6.0) == -1
+    assert contradictions(linearise([sensitivity], data, noise_of(noise)), 6.0) == []
 
 
-def test_the_most_contradicted_datum_of_blocks_is_that_of_the_whole_matrix(many):
+def test_contradicted_data_are_those_of_the_whole_matrix_one_after_another(many):
+    """Each is judged with more noise of those before it, with shared errors and blocks."""
     sensitivity, data, noise = many
-    inverse = np.linalg.inv(sensitivity @ sensitivity.T + whole(noise))
-    distance = np.abs(inverse @ data) / np.sqrt(np.diagonal(inverse))
-    linear, worst = linearise([sensitivity], data, noise), int(np.argmax(distance))
-    assert most_contradicted(linear, np.ones(1), 0.999 * distance[worst]) == worst
-    assert most_contradicted(linear, np.ones(1), 1.001 * distance[worst]) == -1
+    std, matrix = 10.0, sensitivity @ sensitivity.T + whole(noise)
+    expected, distances = [], []
+    for _ in range(3):
+        inverse = np.linalg.inv(matrix)
+        distance = np.abs(inverse @ data) / np.sqrt(np.diagonal(inverse))
+        expected.append(int(np.argmax(distance)))
+        distances.append(distance[expected[-1]])
+        matrix[expected[-1], expected[-1]] += std**2
+    linear = linearise([sensitivity], data, noise)
+    assert contradictions(linear, 0.999 * min(distances), std=std, most=3) == expected
+    assert contradictions(linear, 1.001 * distances[0], std=std) == []
 
 
 @pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
@@ -334,7 +345,7 @@ def test_more_noise_of_a_datum_is_that_of_its_block(many):
     sensitivity, data, noise = many
     more = noise.plus(5.0 * (np.arange(len(data)) == 7))
     changed, again = (
-        with_more_noise(linearise([sensitivity], data, noise), more, 7),
+        with_more_noise(linearise([sensitivity], data, noise), more, np.array([7])),
         linearise([sensitivity], data, more),
     )
     for factor in (0.0, 0.7):
@@ -358,5 +369,5 @@ def test_a_target_that_runs_off_leaves_the_others_their_information():
     assert not without.rounding.any()
     assert set(np.flatnonzero(linear.rounding)) == {0}
     assert linear.rounding[0] < 1e-6 * np.sum(sensitivity[0] ** 2)
-    changed = with_more_noise(linear, noise.plus(0.01 * (np.arange(40) == 3)), 3)
+    changed = with_more_noise(linear, noise.plus(0.01 * (np.arange(40) == 3)), np.array([3]))
     assert np.isfinite(changed.information(np.ones(1), 0.0)[0]).all()

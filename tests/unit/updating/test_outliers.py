@@ -3,22 +3,23 @@
 import numpy as np
 import pytest
 
-from frf_ipz.updating.gaussian import linearise, most_contradicted
+from frf_ipz.updating.gaussian import contradicted, linearise
 from frf_ipz.updating.target_noise import noise_of
 
 SENSITIVITY = np.ones((4, 1))  # four data of one number
 NOISE = 1e-8 * np.eye(4)
 
 
-def worst_of(data, **options):
-    return most_contradicted(linearise([SENSITIVITY], data, noise_of(NOISE)), np.ones(1), 6.0, **options)
+def contradictions(data, **options):
+    linear = linearise([SENSITIVITY], data, noise_of(NOISE))
+    return contradicted(linear, np.ones(1), limit=6.0, excluded_std=1.0, most=4, **options).tolist()
 
 
-@pytest.mark.parametrize(("off", "least", "expected"), [(0.5, 0.02, 2), (0.005, 0.02, -1), (0.005, 0.0, 2)])
+@pytest.mark.parametrize(("off", "least", "expected"), [(0.5, 0.02, [2]), (0.005, 0.02, []), (0.005, 0.0, [2])])
 def test_a_contradicted_datum_counts_from_its_least_size(off, least, expected):
     data = np.array([0.001, 0.001, 0.001 + off, 0.001])
-    assert worst_of(data, least=least) == expected
+    assert contradictions(data, judged=np.abs(data) >= least) == expected
 
 
 def test_data_that_agree_contradict_nothing():
-    assert worst_of(np.full(4, 0.3)) == -1
+    assert contradictions(np.full(4, 0.3)) == []

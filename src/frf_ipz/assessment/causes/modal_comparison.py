@@ -299,10 +299,14 @@ def cost_of_products(
     (..., n_frfs) array
         Minus the logarithm of Cauchy's density, over that of its middle.
     """
-    sizes = np.sqrt((np.abs(measured) ** 2 + np.abs(computed) ** 2) / 2)
-    scales = np.sqrt((SHAPE_SCALE * np.hypot(sizes, SHAPE_SCALE * floor)) ** 2 + deviations**2)
-    errors = np.abs(measured - computed) / np.maximum(scales, np.finfo(float).tiny)
-    return np.asarray(np.log1p(errors**2))
+    sizes = (_squares(measured) + _squares(computed)) / 2 + (SHAPE_SCALE * floor) ** 2
+    scales = SHAPE_SCALE**2 * sizes + deviations**2
+    return np.asarray(np.log1p(_squares(measured - computed) / np.maximum(scales, np.finfo(float).tiny)))
+
+
+def _squares(values: ComplexArray | FloatArray) -> FloatArray:
+    """Squares of moduli; roots are not needed, and of complex numbers cost as much as all the rest."""
+    return np.asarray(values.real**2 + values.imag**2 if np.iscomplexobj(values) else values**2, np.float64)
 
 
 def costs_of_absence(measured: MeasuredModes, products: ComplexArray | FloatArray) -> FloatArray:

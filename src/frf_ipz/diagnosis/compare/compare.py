@@ -20,6 +20,7 @@ from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.result import Diagnosis, DiagnosisVerdict
 from frf_ipz.display import Concise
 from frf_ipz.errors import InputError
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.progress import silent
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ class Comparison(Concise):
         return self.diagnosis.statement
 
 
+@on_one_thread
 def compare_states(
     before: MachineState | Sequence[MachineState],
     after: MachineState,

@@ -27,6 +27,7 @@ from frf_ipz.fe.reduction.options import ReduceOptions
 from frf_ipz.fe.reduction.plan import ReductionPlan, plan_reduction
 from frf_ipz.fe.reduction.retained_dofs import MAX_CONDITION, choose_retained_rows, condition_number
 from frf_ipz.frf import require_measured
+from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.numerics.pencils import separate_equal_modes
 from frf_ipz.structure import ReducedModel, StructuralModel
 
@@ -44,6 +45,7 @@ FEW_DOFS = 24  # up to which they are added all the same
 EIGENVALUE_TOLERANCE = 1e-6  # relative, of a mode's eigenvalue after the reduction: far below what a test resolves
 
 
+@on_one_thread
 def reduce_model(
     measured: Measured,
     fe_model: StructuralModel,

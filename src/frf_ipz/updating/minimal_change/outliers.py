@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import FloatArray, IntArray
-from frf_ipz.updating.gaussian import linearise, most_contradicted, most_likely_scales, with_more_noise
+from frf_ipz.updating.gaussian import contradicted, linearise, most_likely_scales, with_more_noise
 
 if TYPE_CHECKING:
     from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult
@@ -47,20 +47,28 @@ def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots, theta: Floa
     slopes = phase.slopes(theta, start)
     noise = phase.noise.plus((CURVATURE * error**2) ** 2)
     data = error + slopes @ theta
-    scales = np.array([term.std for term in phase.terms])
-    outliers: list[int] = []
-    linear = linearise((term.by_whitened(slopes) for term in phase.terms), data, noise, scales=scales)
+    stds = scales = np.array([term.std for term in phase.terms])
+    most, is_far = int(MAX_SHARE * len(error)), np.abs(data) >= MIN_ERROR
+    outliers = np.zeros(0, int)
+    linear = linearise((term.by_whitened(slopes) for term in phase.terms), data, noise, scales=stds)
     del slopes  # large
-    while len(outliers) <= MAX_SHARE * len(error):
+    while len(outliers) <= most:
         scales = most_likely_scales(linear, phase.terms, scales)
-        worst = most_contradicted(linear, scales, CONTRADICTED, least=MIN_ERROR)
-        if worst < 0:
-            return np.array(outliers, int), scales
-        outliers.append(worst)
-        noise = noise.plus(EXCLUDED_STD**2 * (np.arange(len(error)) == worst))
-        linear = with_more_noise(linear, noise, worst)
+        further = contradicted(
+            linear,
+            scales,
+            limit=CONTRADICTED,
+            excluded_std=EXCLUDED_STD,
+            most=most + 1 - len(outliers),
+            judged=is_far,
+        )
+        if not len(further):
+            return outliers, scales
+        outliers = np.append(outliers, further)
+        noise = noise.plus(np.where(np.isin(np.arange(len(error)), further), EXCLUDED_STD**2, 0.0))
+        linear = with_more_noise(linear, noise, further)
     # so many contradictions are no exception: the model is far off, and all targets count
-    return np.array([], int), np.array([term.std for term in phase.terms])
+    return np.zeros(0, int), stds
 
 
 def unmet_targets(result: PhaseResult, names: tuple[str, ...], excluded: IntArray) -> tuple[str, ...]:
