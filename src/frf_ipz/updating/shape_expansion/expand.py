@@ -111,6 +111,8 @@ def with_expanded_shapes(
     model, ensemble = build_expanded_model(
         loaded.model, modes, count=options.ensemble, calibration=anywhere, seed=options.seed
     )
+    if not _have_mass(ensemble):
+        return updated
     gains = [wrong_gains.get(point, NO_GAIN) for point in left_out.points]
     corrected = replace(fit, gain=gains_of_frfs(fit, wrong_gains)) if wrong_gains else fit
     expansion = ShapeExpansion(
@@ -137,6 +139,11 @@ def with_expanded_shapes(
         scale=fit_scale(corrected, _pairs_of_measured_modes(fit), model, fit.model.poles[: fit.n_modes], ensemble),
         expansion=expansion,
     )
+
+
+def _have_mass(ensemble: FloatArray) -> bool:
+    """Tell whether members are structures: shapes that scatter by far more than they are large leave no mass."""
+    return bool((np.linalg.matrix_rank(ensemble[:, 0], hermitian=True) == ensemble.shape[-1]).all())
 
 
 def _left_out_of_update(fit: ModalFit, update_without: Callable[[Collection[AnyDof]], UpdatedModel]) -> FloatArray:
