@@ -104,7 +104,7 @@ def test_free_beam_has_four_modes_and_drifts(beam_fit):
 
 @pytest.mark.slow
 def test_free_beam_has_no_mode_within_the_drift_of_another(beam):
-    fit = fit_modes(beam.select_frfs(range(1, 9)), options=replace(BEAM_BAND, band_hz=(50.0, 999.0)))
+    fit = fit_modes(beam.select_frfs(range(1, 9)), options=FitOptions(band_hz=(50.0, 1000.0)))
     np.testing.assert_allclose(frequencies(fit), BEAM_HZ, rtol=1e-4, atol=0)
 
 
