@@ -399,6 +399,23 @@ def test_drift_between_frfs_is_reported():
     assert float(fit.warnings[-1].split(" by ")[1].split(" ppm")[0]) == pytest.approx(200, rel=0.05)
 
 
+def test_averages_over_a_drift_are_no_further_modes():
+    """Impacts of one FRF waver as FRFs do: its peak is that of no single pole, to one part in 100 000."""
+    lines, rng, natural_hz = np.arange(5400, 5800) * 0.02, np.random.default_rng(9), np.array([110.5, 113.5])
+    truth = random_modes(natural_hz, 1.2e-4, n_outputs=6, n_inputs=1, seed=9)
+    columns = []
+    for frf in range(6):
+        drift = 4e-5 * rng.standard_normal()
+        moved = [replace(truth, frequency_hz=natural_hz * (1 + drift + 2e-5 * rng.standard_normal())) for _ in range(4)]
+        impacts = [accelerances(one, lines, noise=1e-5, seed=6) for one in moved]
+        columns.append(np.mean([frfs.select_frfs([frf]).values for frfs in impacts], axis=0))
+    values = np.hstack(columns)
+    fit = fit_modes(replace(impacts[0], values=values, variance=np.full(values.shape, np.nan)))
+    assert_complete(fit, truth)  # five modes where splits stand for what the drift leaves
+    assert "drifted" in fit.warnings[-1]
+    assert fit.decisions["reason"].str.contains("nearer to it than the structure drifts").any()
+
+
 def test_frequencies_that_drift_are_those_of_the_mean_and_known_as_well_as_it_is():
     """FRFs of little noise do not decide which temperature the poles belong to."""
     truth = random_modes(SPREAD, 0.001, seed=SEED)

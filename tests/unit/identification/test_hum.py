@@ -65,6 +65,17 @@ def test_why_a_tone_is_none_is_said():
         assert all(np.abs(np.array(MAINS_HZ) - hz).min() < 0.6 for hz in hum["frequency_hz"])
 
 
+def test_a_mode_wider_than_a_tone_under_the_flank_of_another_is_no_hum():
+    """Its half width is 1.4 lines; beside the other's model error its tails tell nothing."""
+    truth = random_modes(np.array([39.73, 40.15]), np.array([0.0045, 0.0028]), n_outputs=6, n_inputs=1, seed=1)
+    truth = replace(truth, outputs=truth.outputs * np.array([0.25, 1.0]))
+    frfs = accelerances(truth, np.arange(240, 400) * 0.125, noise=1e-3, seed=1)
+    real, imag = np.random.default_rng(1).standard_normal((2, *frfs.values.shape)) * 0.1
+    fit = fit_modes(frf_set(frfs.frequency_hz, frfs.values * (1 + real + 1j * imag), frfs.labels))
+    assert np.abs(fit.modes["frequency_hz"] - 39.73).min() < 0.15
+    assert not fit.decisions.query("frequency_hz < 39.9")["reason"].str.contains("hum").any()
+
+
 @pytest.mark.parametrize("width_hz", [0.02, 0.06, 0.12])
 def test_a_mode_between_lines_is_found(width_hz):
     lines_hz = np.arange(80, 1440) * 0.125

@@ -103,6 +103,12 @@ def test_free_beam_has_four_modes_and_drifts(beam_fit):
 
 
 @pytest.mark.slow
+def test_free_beam_has_no_mode_within_the_drift_of_another(beam):
+    fit = fit_modes(beam.select_frfs(range(1, 9)), options=FitOptions(band_hz=(50.0, 1000.0)))
+    np.testing.assert_allclose(frequencies(fit), BEAM_HZ, rtol=1e-4, atol=0)
+
+
+@pytest.mark.slow
 def test_ninth_file_of_the_free_beam_with_poles_held(beam):
     eight = fit_modes(beam.select_frfs(range(8)), options=BEAM_BAND)
     assert eight.n_modes == 4

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import stdtrit
 
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.identification.likelihood.compression import CompressedSystem, model_columns, response
@@ -33,6 +34,7 @@ MAX_DRIFT = 2e-3  # a larger change is no drift but another structure
 MIN_EXPLAINED = 0.3  # part of the excess misfit that the factors must explain
 PREDICTED = 0.1  # of that the first step must predict: too little, where the drift exceeds a peak's width
 ITERATIONS = 6
+BEYOND = 0.01  # chance that two moments of the drift are further apart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,6 +57,14 @@ class Drift:
     std: FloatArray
     receptance: ComplexArray
     mean_std: float
+
+    @property
+    def reach(self) -> float:
+        """Relative change between two further moments, which it exceeds once in a hundred, by Student's distribution.
+
+        The structure wavers while the impacts of one FRF are averaged as it does between FRFs.
+        """
+        return float(np.sqrt(2) * np.std(self.relative_change, ddof=1) * stdtrit(len(self.std) - 1, 1 - BEYOND / 2))
 
 
 def find_drift(

@@ -421,7 +421,7 @@ def _against_model_error(fitted: FittedModes, options: FitOptions) -> FittedMode
     relative = np.maximum(squares - fitted.noise, 0.0) / np.maximum(power, np.finfo(float).tiny)
     error = np.median(relative, axis=0) / log(2)  # an exponential distribution has ln 2 times its mean at the median
     lines = _with_model_error(replace(fitted.lines, variance=fitted.noise), error)
-    selected = _select(lines, fitted.fit.poles, fitted.terms, options, noise_is_known=False)
+    selected = _select(lines, fitted.fit.poles, fitted.terms, options, noise_is_known=False, drift=fitted.drift)
     lines = replace(lines, known=np.ones_like(lines.known))  # the model error is part of it: not to be estimated again
     refitted = _refine_with_final_weights(
         lines, selected, fitted.terms, options, start=fitted.start, delay_s=fitted.delay_s, model_limits=True
@@ -435,7 +435,7 @@ def _against_model_error(fitted: FittedModes, options: FitOptions) -> FittedMode
         misfit_ratio=np.sqrt(np.sum(squares / fitted.noise, axis=0) / degrees_of_freedom),
         noise=fitted.noise,
         model_error=error,
-        drift=refitted.drift or fitted.drift,
+        drift=refitted.drift,
         force_error=refitted.force_error or fitted.force_error,
         decisions=(
             *fitted.decisions,
@@ -451,9 +451,10 @@ def _select(
     options: FitOptions,
     *,
     noise_is_known: bool,
+    drift: Drift | None = None,
 ) -> SelectedModes:
     data = replace(lines.weighted(shared=True), real_modes=options.modes == "real")
-    selected = select_modes(data, poles, terms, options, noise_is_known=noise_is_known)
+    selected = select_modes(data, poles, terms, options, noise_is_known=noise_is_known, drift=drift)
     _require_modes(lines, selected.fit.poles)
     return selected
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from frf_ipz.identification.search.goodness_of_fit import GoodnessOfFit
 
 LOBE = 1.5  # lines on either side of a tone's frequency that a Hann window's main lobe reaches, to the half of a line
+WIDEST = 3**-0.5  # half width, in lines, of the pole that has half its height a line beside it, as that lobe has
 
 
 def find_hum(
@@ -71,8 +72,8 @@ def find_hum(
 
 
 def _is_narrow(data: WeightedLines, fit: RefinedPoles) -> BoolArray:
-    """Mark the poles whose peak, as the lines see it, is no wider than what a tone stands in."""
-    return np.asarray(data.s.real[0] - fit.poles.real < LOBE * np.median(np.diff(data.s.imag)))
+    """Mark the poles whose peak, as the lines see it, is no wider than that of a tone."""
+    return np.asarray(data.s.real[0] - fit.poles.real < WIDEST * np.median(np.diff(data.s.imag)))
 
 
 def _tail_significance(

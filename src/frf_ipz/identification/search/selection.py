@@ -22,7 +22,7 @@ from frf_ipz.identification.search.goodness_of_fit import (
     over_bic,
 )
 from frf_ipz.identification.search.hum import find_hum
-from frf_ipz.identification.search.spurious_poles import DEMANDED, find_spurious_poles
+from frf_ipz.identification.search.spurious_poles import DEMANDED, find_spurious_poles, half_widths_apart
 from frf_ipz.rational import damping_ratio, natural_frequency_hz
 
 if TYPE_CHECKING:
@@ -91,7 +91,13 @@ class _Search:
 
 
 def select_modes(
-    data: WeightedLines, poles: ComplexArray, terms: SmoothTerms, options: FitOptions, *, noise_is_known: bool
+    data: WeightedLines,
+    poles: ComplexArray,
+    terms: SmoothTerms,
+    options: FitOptions,
+    *,
+    noise_is_known: bool,
+    drift: Drift | None = None,
 ) -> SelectedModes:
     """Find the modes that the lines support.
 
@@ -107,6 +113,8 @@ def select_modes(
         Poles that are pinned and rejected.
     noise_is_known : bool
         All FRFs came with their variance.
+    drift : Drift, optional
+        That has been taken off the lines; it is looked for by default.
 
     Returns
     -------
@@ -114,6 +122,7 @@ def select_modes(
         The fit.
     """
     search = _search(data, terms, options, noise_is_known=noise_is_known)
+    search.drift = drift
     poles = _with_pinned(search, _without_rejected(search, poles))
     # start poles are not many, and neither errors of strong modes nor tails of weak ones show yet
     start = refine_poles(data, poles, terms, iterations=ROUGH_ITERATIONS)
@@ -346,7 +355,8 @@ def _spurious_reasons(search: _Search, fit: RefinedPoles, goodness: GoodnessOfFi
     hum = find_hum(search.data, fit, search.terms, goodness, demanded=demanded)
     if search.noise_is_trusted:
         return hum
-    by_mode = find_spurious_poles(search.data, fit, goodness)
+    drift_reach = search.drift.reach if search.drift else 0.0
+    by_mode = find_spurious_poles(search.data, fit, goodness, drift_reach=drift_reach)
     return [first or second for first, second in zip(by_mode, hum, strict=True)]
 
 
@@ -359,13 +369,27 @@ def _reason(goodness: GoodnessOfFit, number: int, spurious: str) -> str:
 
 
 def _without_drift(search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit) -> tuple[RefinedPoles, GoodnessOfFit]:
-    drift_and_fit = None if search.drift else find_drift(search.data, fit, search.terms)
+    drift_and_fit = None if search.drift else _drift_beside_modes(search, fit, goodness)
     if drift_and_fit is None:
         return fit, goodness
     search.drift, fit_without_drift = drift_and_fit
     search.data = replace(search.data, receptance=search.drift.receptance)
     search.refused.clear()
     return _drop_insignificant(search, fit_without_drift)
+
+
+def _drift_beside_modes(
+    search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit
+) -> tuple[Drift, RefinedPoles] | None:
+    """Find the drift, first with one pole a peak: others there may stand for it, and each costs more numbers."""
+    weaker = (half_widths_apart(fit.poles) < 1) & (goodness.significance > goodness.significance[:, None])
+    shares_peak = weaker.any(axis=1) & ~_is_pinned(search, fit.poles)
+    if shares_peak.any():
+        one_a_peak = refine_poles(search.data, fit.poles[~shares_peak], search.terms, iterations=ROUGH_ITERATIONS)
+        found = find_drift(search.data, one_a_peak, search.terms)
+        if found is not None and found[1].misfit < fit.misfit:
+            return found
+    return find_drift(search.data, fit, search.terms)
 
 
 def _proposed_poles(search: _Search, goodness: GoodnessOfFit) -> ComplexArray:

@@ -3,6 +3,9 @@
 Real structures drift, rattle and modulate. Where the model does not reach the noise, or the noise was not measured,
 each strong peak leaves a misfit in proportion to itself: poles under the same peak, and side bands beside it. They are
 distinguished from modes by their size against the strong one.
+
+Where frequencies waver from FRF to FRF, they waver within an FRF's averages too, so that peaks are no longer those of
+single poles. A second pole under a peak and within reach of the drift stands for that, however significant it is.
 """
 
 from __future__ import annotations
@@ -28,7 +31,9 @@ SIDE_BAND_ENERGY = 1e-5  # energy of their peaks over that of the mode's
 DEMANDED = 6.0  # times what the BIC demands, where the misfit is not noise alone
 
 
-def find_spurious_poles(data: WeightedLines, fit: RefinedPoles, goodness: GoodnessOfFit) -> list[str]:
+def find_spurious_poles(
+    data: WeightedLines, fit: RefinedPoles, goodness: GoodnessOfFit, *, drift_reach: float = 0.0
+) -> list[str]:
     """Find the poles that are no modes of their own.
 
     Parameters
@@ -39,6 +44,8 @@ def find_spurious_poles(data: WeightedLines, fit: RefinedPoles, goodness: Goodne
         The fit.
     goodness : GoodnessOfFit
         How significant its poles are.
+    drift_reach : float
+        Relative change of frequencies between two moments of the measurement, at most; 0 without a drift.
 
     Returns
     -------
@@ -53,6 +60,7 @@ def find_spurious_poles(data: WeightedLines, fit: RefinedPoles, goodness: Goodne
     for number, pole in enumerate(poles):
         distance = np.abs(poles.imag - pole.imag)
         reason = _stronger_mode_reason(number, poles, distance, significance, energy)
+        reason = reason or _drift_reason(number, poles, distance / (width + width[number]), significance, drift_reach)
         if not reason and significance[number] < DEMANDED and not goodness.is_needed[number]:
             reason = (
                 f"takes off the misfit {significance[number]:.2g} times what the BIC demands: within the model error"
@@ -75,6 +83,20 @@ def half_widths_apart(poles: ComplexArray) -> FloatArray:
         Distance of each two over the sum of their half widths: below 1 they share a peak.
     """
     return np.asarray(np.abs(poles[:, None] - poles) / -(poles.real[:, None] + poles.real))
+
+
+def _drift_reason(
+    number: int, poles: ComplexArray, apart: FloatArray, significance: FloatArray, drift_reach: float
+) -> str:
+    is_same = (apart < 1) & (np.abs(poles.imag - poles[number].imag) < drift_reach * poles[number].imag)
+    stronger = np.flatnonzero(is_same & (significance > significance[number]))
+    if not len(stronger):
+        return ""
+    strong = poles[stronger[np.argmax(significance[stronger])]]
+    return (
+        f"lies under the peak at {abs(strong) / (2 * np.pi):.6g} Hz, nearer to it than the structure drifts while it "
+        f"is measured ({drift_reach * 1e6:.2g} ppm): averages over a drifting peak look like this"
+    )
 
 
 def _stronger_mode_reason(

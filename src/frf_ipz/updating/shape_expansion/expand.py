@@ -88,9 +88,7 @@ def with_expanded_shapes(
         The same one where the update stays.
     """
     measured = measured_shapes(fit)
-    if measured is None or len(side_with_more(fit)) < FEWEST:
-        return updated
-    if len(measured.outputs) + len(measured.inputs) > MOST_ENDS:
+    if measured is None or not _is_expandable(fit, measured):
         return updated
     without = _left_out_of_update(fit, update_without)
     if not _may_exceed(without, SIXTH * GAIN_MARGIN_DB):
@@ -111,6 +109,8 @@ def with_expanded_shapes(
     model, ensemble = build_expanded_model(
         loaded.model, modes, count=options.ensemble, calibration=anywhere, seed=options.seed
     )
+    if not _have_mass(ensemble):
+        return updated
     gains = [wrong_gains.get(point, NO_GAIN) for point in left_out.points]
     corrected = replace(fit, gain=gains_of_frfs(fit, wrong_gains)) if wrong_gains else fit
     expansion = ShapeExpansion(
@@ -137,6 +137,16 @@ def with_expanded_shapes(
         scale=fit_scale(corrected, _pairs_of_measured_modes(fit), model, fit.model.poles[: fit.n_modes], ensemble),
         expansion=expansion,
     )
+
+
+def _is_expandable(fit: ModalFit, measured: MeasuredShapes) -> bool:
+    n_ends = len(measured.outputs) + len(measured.inputs)
+    return len(side_with_more(fit)) >= FEWEST and n_ends <= MOST_ENDS
+
+
+def _have_mass(ensemble: FloatArray) -> bool:
+    """Tell whether members are structures: shapes that scatter by far more than they are large leave no mass."""
+    return bool((np.linalg.matrix_rank(ensemble[:, 0], hermitian=True) == ensemble.shape[-1]).all())
 
 
 def _left_out_of_update(fit: ModalFit, update_without: Callable[[Collection[AnyDof]], UpdatedModel]) -> FloatArray:

@@ -9,6 +9,7 @@ from scipy import sparse
 import frf_ipz
 from frf_ipz.export.state_space import make_state_space
 from frf_ipz.updating.problem import make_problem
+from frf_ipz.updating.shape_expansion import expand
 from frf_ipz.updating.shape_expansion.attached_masses import attachment_places, find_attached_masses
 from frf_ipz.updating.shape_expansion.expand import with_expanded_shapes
 from frf_ipz.updating.shape_expansion.expanded_model import build_expanded_model, expand_modes
@@ -210,6 +211,22 @@ def test_an_update_is_judged_by_points_that_it_was_not_given(left_out, expanded,
         options=frf_ipz.UpdateOptions(ensemble=2),
     )
     assert (chosen is plain) == is_near
+
+
+def test_shapes_that_scatter_beyond_any_structure_do_not_take_the_place_of_an_update(left_out, monkeypatch):
+    """As a mode that is none makes left-out points: members have no mass then, to rounding, and the run stopped."""
+    fit, reduced_model, *_ = left_out
+    plain = frf_ipz.update_model(fit, reduced_model, options=frf_ipz.UpdateOptions(expand=False, ensemble=0))
+    monkeypatch.setattr(expand, "_calibrations", lambda *_: (1e3, 1e3))
+    chosen = with_expanded_shapes(
+        plain,
+        fit,
+        make_problem(reduced_model, fit, frf_ipz.pair_roots(fit, reduced_model), None),
+        update_without=lambda _: plain,
+        geometry=make_nominal().geometry,
+        options=frf_ipz.UpdateOptions(ensemble=20),
+    )
+    assert chosen is plain
 
 
 def test_a_model_frequency_at_a_measured_one_makes_no_shape_surer(left_out):
