@@ -48,6 +48,7 @@ BENT = (
 )
 SPREAD = 4.0  # half units of the last digit of all terms, added in squares: no sum of rounded terms is farther off
 FREE_ROWS = 0.9  # of the rows lie away from supports, so that a translation strains nothing there
+N_TRANSLATIONS = 3  # of the motions of a rigid body, which come first: no rounded position makes them strain anything
 DEPENDENT = 1e-10  # of the largest weight: a combination of motions below is linearly dependent
 MANY_MODES = 4  # a larger share of all modes than one in so many is found faster by LAPACK
 FLEXIBILITY_STEPS = 60
@@ -495,7 +496,7 @@ class _System:
             dofs=dofs,
             geometry=model.geometry,
             rigid=motions[:, :0],
-            in_arithmetic=EPS if in_print else _arithmetic_rounding(stiffness, motions),
+            in_arithmetic=EPS if in_print else _arithmetic_rounding(stiffness, motions[:, :N_TRANSLATIONS]),
             in_print=in_print,
         )
         weights, _ = _ritz(whole, motions)
@@ -503,8 +504,12 @@ class _System:
         forces = np.abs(multiply(stiffness, combined))
         sizes = multiply(abs(stiffness), np.abs(motions) @ np.abs(weights))  # before terms cancel each other
         allowed = max(NO_ENERGY * whole.in_arithmetic, PRINTED * in_print) * sizes
+        turns, by_turns = motions[:, N_TRANSLATIONS:], np.abs(weights[N_TRANSLATIONS:])
         if in_print:  # then nodes may be printed with few digits too, and rotations are rounded by that
-            allowed += _by_printed_positions(whole)[:, None] * np.abs(weights[3:]).sum(0)
+            allowed += _by_printed_positions(whole)[:, None] * by_turns.sum(0)
+        else:
+            in_turns = _arithmetic_rounding(stiffness, turns)
+            allowed += NO_ENERGY * in_turns * multiply(abs(stiffness), np.abs(turns) @ by_turns)
         rigid = combined[:, (forces <= allowed).all(0)]
         system = replace(whole, rigid=rigid)
         if in_print and mass.shape[0] < DENSE_ORDER:
@@ -570,9 +575,10 @@ def _relative_forces(stiffness: Matrix, motion: FloatArray) -> FloatArray:
 
 
 def _arithmetic_rounding(stiffness: Matrix, motions: FloatArray) -> float:
-    """Relative rounding of the stiffness matrix: force on most rows under a rigid motion, which strains nothing.
+    """Relative rounding of the stiffness matrix: force on most rows under rigid motions, which strain nothing.
 
     It is that of double precision for a model built here, and that of the condensation for one that was condensed.
+    Under a rotation it may be that of the positions of the nodes as well, of which the stiffness itself knows nothing.
     """
     roundings = [EPS]
     for motion in motions.T:

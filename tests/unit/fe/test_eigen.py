@@ -73,6 +73,24 @@ def test_a_very_soft_suspension_is_no_rigid_body_motion(elements):
     assert modes.natural_frequency_hz[2] > 100
 
 
+@pytest.mark.parametrize("digits", [10, 12])
+def test_printed_positions_do_not_hide_the_modes_of_a_machine_on_mounts(digits):
+    """Under a rotation a stiffness seems as rounded as the positions of the nodes are."""
+    model = beam(elements=700)
+    hung = model.stiffness_all.tolil()
+    for node in (141, 561):
+        hung[2 * node - 2, 2 * node - 2] += 50.0
+    places = np.array([[float(f"{value:.{digits}g}") for value in place] for place in model.geometry.coordinates_m])
+    basis = solve_basis(structural_model(model.mass_all, hung, model.all_dofs, coordinates_m=places), n_modes=4)
+    exact = solve_basis(
+        structural_model(model.mass_all, hung, model.all_dofs, coordinates_m=model.geometry.coordinates_m), n_modes=4
+    )
+    assert basis.n_rigid == 0
+    assert_allclose(basis.natural_frequency_hz, exact.natural_frequency_hz, rtol=1e-4)
+    free = structural_model(model.mass_all, model.stiffness_all, model.all_dofs, coordinates_m=places)
+    assert solve_basis(free, n_modes=4).n_rigid == 2
+
+
 def test_large_models_have_the_modes_of_small_ones(free_plate, monkeypatch):
     large = solve_basis(free_plate, n_modes=14)
     monkeypatch.setattr(eigen, "DENSE_ORDER", 10**6)

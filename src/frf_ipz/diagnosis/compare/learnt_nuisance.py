@@ -281,6 +281,7 @@ def _signs(modes: Modes, nuisance_prior: NuisancePrior) -> FloatArray:
     rows, columns = nuisance_prior.pairs
     signs, blocks = np.ones(nuisance_prior.size), nuisance_prior.blocks
     signs[blocks.stiffness] = signs[blocks.mass] = shape_signs[rows] * shape_signs[columns]
+    signs[blocks.coupling] = (shape_signs[rows] * shape_signs[columns])[nuisance_prior.is_coupled]
     return signs
 
 

@@ -15,6 +15,7 @@ from frf_ipz.diagnosis.deadline import NO_LIMIT, Deadline
 from frf_ipz.diagnosis.evidence.fit import Data, Fit
 from frf_ipz.diagnosis.evidence.hypothesis import Component, Hypothesis, make_hypothesis
 from frf_ipz.diagnosis.evidence.map_fit import adopt_modes, fit_map
+from frf_ipz.diagnosis.measured.disagreement import measure_disagreement
 from frf_ipz.diagnosis.measured.transfer_functions import Whitening, make_whitening, select_points
 from frf_ipz.diagnosis.model.basis import make_basis
 from frf_ipz.diagnosis.model.change import NO_CHANGE
@@ -59,6 +60,8 @@ class InferenceProblem:
         The same with inflated errors, for first steps.
     sparse_data : Data
         Fewer points near the axis, for score tests of small effects.
+    disagreement : (n_frfs, n_subbands) array
+        How much records disagree in parts of the band, over what their noise explains; 1 where they do not.
     kind : str
         What was measured: impacts of a ``hammer``, ``random`` records from rest, ``running`` ones, or ``frf``.
     deadline : Deadline
@@ -73,6 +76,7 @@ class InferenceProblem:
     data: Data
     rough_data: Data
     sparse_data: Data
+    disagreement: FloatArray
     kind: str
     deadline: Deadline = NO_LIMIT
     _known: dict[tuple[object, ...], Hypothesis] = field(init=False, default_factory=dict, repr=False)
@@ -229,6 +233,7 @@ def pose_problem(
         data=make_data(source.training, options, free_gains=free_gains),
         rough_data=replace(rough, is_bounded=False),
         sparse_data=make_data(sparse, options, free_gains=free_gains),
+        disagreement=measure_disagreement(source, options.stiffness_tolerance),
         kind=source.kind,
     )
 

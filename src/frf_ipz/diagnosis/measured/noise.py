@@ -150,9 +150,9 @@ def _fit_parts(shapes: FloatArray, energy: FloatArray, known: FloatArray) -> Flo
         return np.zeros(shapes.shape[1])
     energy, known = energy / largest, known / largest
     unknown = np.maximum(energy - known, 0.0)
-    model = np.full(len(energy), max(float(np.median(unknown)), SMALLEST * float(energy.max(initial=1e-300))))
     parts = np.zeros(shapes.shape[1])
     parts[0] = float(np.median(unknown / shapes[:, 0]))
+    model = np.maximum(parts[0] * shapes[:, 0], SMALLEST)  # lines may differ by the ranges of a recorder
     for _ in range(ROUNDS):
         total = model + known
         use = energy < OUTLIER * total

@@ -132,8 +132,8 @@ class Modes:
         How they change with positions, 1/m.
     vectors : (q_basis, q) array
         The modes in terms of the basis.
-    viscous : (q, q) array, optional
-        What the model's damping matrix couples modes by; what it damps each mode by is in its ratio.
+    viscous : (r, r) array, optional
+        What damping couples the first modes by: the model's matrix all of them, scatter those with scatter.
     """
 
     omega: FloatArray
@@ -223,7 +223,12 @@ def scatter_modes(
     turned[:, :m] = modified.vectors[:, :m] @ rotation
     ratio = modified.stated_ratio.copy()
     ratio[:m] *= 1 + nuisance_values.damping
-    viscous = modal_coupling(turned.T @ basis.damping @ turned) if modified.is_coupled else None
+    viscous = _scatter_coupling(modified, rotation, nuisance_values.coupling)
+    if modified.is_coupled:
+        stated = modal_coupling(turned.T @ basis.damping @ turned)
+        if viscous is not None:
+            stated[:m, :m] += viscous
+        viscous = stated
     return Modes(
         omega=omega,
         squares=scattered,
@@ -237,6 +242,20 @@ def scatter_modes(
         vectors=turned,
         viscous=viscous,
     )
+
+
+def _scatter_coupling(modified: ModifiedStructure, rotation: FloatArray, coupling: FloatArray) -> FloatArray | None:
+    """Couple the modes with scatter, (m, m), by what damping couples those without by."""
+    if not coupling.any():
+        return None
+    m = len(coupling)
+    own = np.sqrt(coupling_scale(modified.squares[:m], modified.stated_ratio[:m]))
+    return rotation.T @ (np.outer(own, own) * coupling) @ rotation
+
+
+def coupling_scale(squares: FloatArray, ratio: FloatArray) -> FloatArray:
+    """Give the damping of modes, 2 zeta omega, rad/s: (m,) arrays of squared frequencies and damping ratios."""
+    return np.asarray(2 * ratio * np.sqrt(np.abs(squares)))
 
 
 def _scatter_squares(

@@ -2,11 +2,12 @@
 
 Small errors of mass and stiffness, wherever they are, act on the modes of the band as symmetric matrices: stiffness
 ``omega_i omega_j kappa_ij`` and mass ``mu_ij``. Their diagonals are the scatter of the frequencies, the rest that of
-the shapes, and with it of the zeros. Damping ratios of modes, positions and directions of sensors and excited points,
-and gains of channels come beside. A tolerance is the half width of what can be, so that the standard deviation is the
-tolerance over the square root of three. Nothing that is stated by a tolerance lies far outside of it: there the prior
-rises much faster than a normal one. Shapes of modes, and all about modes beyond the band, are stated by no tolerance
-and keep a normal prior.
+the shapes, and with it of the zeros. What modes lose scatters in the same way: damping ratios, and what damping couples
+two modes by, ``2 (zeta_i omega_i zeta_j omega_j)^(1/2)`` times a number that is zero only where damping is proportional
+to mass and stiffness everywhere. Positions and directions of sensors and excited points, and gains of channels come
+beside. A tolerance is the half width of what can be, so that the standard deviation is the tolerance over the square
+root of three. Nothing that is stated by a tolerance lies far outside of it: there the prior rises much faster than a
+normal one. Shapes of modes, and all about modes beyond the band, are stated by no tolerance and keep a normal prior.
 
 Near an excited point FRFs contain the local compliance around the contact, which depends on its size and which no mesh
 represents well: the compliance of all modes beyond those with scatter is not known exactly.
@@ -39,7 +40,7 @@ from frf_ipz.diagnosis.model.layout import (
 )
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beam_models import with_formulation
-from frf_ipz.fe.eigen import solve_basis
+from frf_ipz.fe.eigen import damping_ratios, solve_basis
 from frf_ipz.fe.kinds.beam import BeamFile
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
     from frf_ipz.dofs import AnyDof
 
 UNIFORM_STD = 1 / np.sqrt(3.0)  # standard deviation of what is uniform between -1 and 1
-OFF_DIAGONAL = 0.5  # kappa and mu between two modes, over those of one: fields average out
+OFF_DIAGONAL = 0.5  # stiffness, mass and damping between two modes, over those of one: fields average out
 MASS_PART = 0.5  # tolerance of masses over that of stiffness
 SUSPENSION_FREQUENCY = 0.02  # frequency of a free structure on its suspension, over its first elastic one
 MODES_BEYOND = 2.0  # times the top of the band: modes with scatter of their own
@@ -76,6 +77,8 @@ class NuisanceValues:
         Relative errors of stiffness and mass on the first modes, symmetric.
     damping : (m,) array
         Relative errors of damping ratios.
+    coupling : (m, m) array
+        What damping couples the first modes by, over the geometric mean of their own; symmetric, zero on the diagonal.
     suspension : (n_rigid,) array
         Squared frequencies of rigid-body modes, (rad/s)^2.
     output_shift, input_shift : (n, n_axes) array
@@ -89,6 +92,7 @@ class NuisanceValues:
     kappa: FloatArray
     mu: FloatArray
     damping: FloatArray
+    coupling: FloatArray
     suspension: FloatArray
     output_shift: FloatArray
     input_shift: FloatArray
@@ -106,6 +110,8 @@ class NuisanceBlocks:
         Upper triangles of kappa and mu, row by row.
     damping : slice
         Relative errors of damping ratios.
+    coupling : slice
+        What damping couples two modes by, of those pairs that it may couple.
     suspension : slice
         Squared frequencies of rigid-body modes.
     output_shifts, input_shifts : slice
@@ -120,6 +126,7 @@ class NuisanceBlocks:
     stiffness: slice
     mass: slice
     damping: slice
+    coupling: slice
     suspension: slice
     output_shifts: slice
     input_shifts: slice
@@ -145,6 +152,8 @@ class NuisancePrior:
         Standard deviations.
     damping_std : (m,) array
         Of damping ratios, relative.
+    coupling_std : (m, m) array
+        Of what damping couples modes by, over the geometric mean of their own damping.
     suspension_std : float
         Of squared frequencies of rigid-body modes, (rad/s)^2.
     axes : tuple of str
@@ -168,6 +177,7 @@ class NuisancePrior:
     kappa_std: FloatArray
     mu_std: FloatArray
     damping_std: FloatArray
+    coupling_std: FloatArray
     suspension_std: float
     axes: tuple[str, ...]
     shift_std: FloatArray
@@ -184,11 +194,17 @@ class NuisancePrior:
         return _triangle(self.n_modes)
 
     @property
+    def is_coupled(self) -> BoolArray:
+        """Which of all pairs damping may couple, (n_pairs,) array."""
+        return np.asarray(self.coupling_std[self.pairs] > 0)
+
+    @property
     def blocks(self) -> NuisanceBlocks:
         """Where each kind of parameter stands."""
         n_axes = len(self.axes)
         shifts = n_axes * self.n_outputs, n_axes * self.n_inputs
-        return _place_blocks(self.n_modes, self.n_rigid, *shifts, len(self.local_std), self.n_channels)
+        n_coupled = int(np.count_nonzero(self.is_coupled))
+        return _place_blocks(self.n_modes, n_coupled, self.n_rigid, *shifts, len(self.local_std), self.n_channels)
 
     @property
     def size(self) -> int:
@@ -297,6 +313,7 @@ class NuisancePrior:
             kappa=self._symmetric(values[blocks.stiffness]) * self.kappa_std,
             mu=self._symmetric(values[blocks.mass]) * self.mu_std,
             damping=np.maximum(values[blocks.damping] * self.damping_std, -0.95),
+            coupling=self._symmetric(values[blocks.coupling], self.is_coupled) * self.coupling_std,
             suspension=values[blocks.suspension] * self.suspension_std,
             output_shift=values[blocks.output_shifts].reshape(self.n_outputs, n_axes) * self.shift_std,
             input_shift=values[blocks.input_shifts].reshape(self.n_inputs, n_axes) * self.shift_std,
@@ -304,8 +321,8 @@ class NuisancePrior:
             gains=np.clip(values[blocks.gains] * self.gain_std, -MAX_GAIN, MAX_GAIN),
         )
 
-    def _symmetric(self, triangle: FloatArray) -> FloatArray:
-        rows, columns = self.pairs
+    def _symmetric(self, triangle: FloatArray, used: BoolArray | slice = slice(None)) -> FloatArray:
+        rows, columns = (ends[used] for ends in self.pairs)
         matrix = np.zeros((self.n_modes, self.n_modes))
         matrix[rows, columns] = matrix[columns, rows] = triangle
         return matrix
@@ -317,13 +334,14 @@ def _indices(block: slice) -> IntArray:
 
 @cache
 def _place_blocks(
-    n_modes: int, n_rigid: int, n_output_shifts: int, n_input_shifts: int, n_frfs: int, n_channels: int
+    n_modes: int, n_coupled: int, n_rigid: int, n_output_shifts: int, n_input_shifts: int, n_frfs: int, n_channels: int
 ) -> NuisanceBlocks:
     n_pairs = n_modes * (n_modes + 1) // 2
     return NuisanceBlocks.in_order(
         stiffness=n_pairs,
         mass=n_pairs,
         damping=n_modes,
+        coupling=n_coupled,
         suspension=n_rigid,
         output_shifts=n_output_shifts,
         input_shifts=n_input_shifts,
@@ -376,13 +394,15 @@ def make_nuisance_prior(basis: Basis, layout: Layout, options: DiagnoseOptions) 
     shift_std = np.array([options.position_tolerance_m_per_m * span[axis] * UNIFORM_STD for axis in axes])
     turned = _list_turns(basis, layout)
     turn_std = np.full(len(turned), np.deg2rad(options.angle_tolerance_deg) * UNIFORM_STD)
+    damping = _damping_std(options.damping_tolerance * UNIFORM_STD, growth, n_rigid)
     beyond_scatter = LOCAL_PART * _local_compliance(basis, layout, n_modes)
     return NuisancePrior(
         n_modes=n_modes,
         n_rigid=n_rigid,
         kappa_std=kappa,
         mu_std=mu,
-        damping_std=_damping_std(options.damping_tolerance * UNIFORM_STD, growth, n_rigid),
+        damping_std=damping,
+        coupling_std=_coupling_std(basis, damping, options.stiffness_tolerance),
         suspension_std=(SUSPENSION_FREQUENCY * first) ** 2,
         axes=(*axes, *turned),
         shift_std=np.concatenate([shift_std, turn_std]),
@@ -415,6 +435,23 @@ def _damping_std(stated: float, growth: FloatArray, n_rigid: int) -> FloatArray:
     std = np.maximum(stated, np.minimum(stated * growth, UNSTATED_SPREAD))
     std[:n_rigid] = UNSTATED_SPREAD
     return std
+
+
+def _coupling_std(basis: Basis, damping_std: FloatArray, least: float) -> FloatArray:
+    """Give standard deviations of what damping couples modes by, over the geometric mean of their own.
+
+    Where it changes a shape by less than a model's FRFs are exact to, modes lie so far apart that it is left out:
+    ``2 (zeta_i omega_i zeta_j omega_j)^(1/2) (omega_i omega_j)^(1/2) / |omega_i^2 - omega_j^2|``, to first order
+    [Hasselman1976]. T. K. Hasselman, Modal coupling in lightly damped structures, AIAA Journal 14 (1976) 1627-1628.
+    """
+    modes = basis.modes.first(len(damping_std))
+    own = damping_ratios(basis.model, modes) * modes.eigenvalues
+    relative = np.minimum(damping_std, UNSTATED_SPREAD)
+    std = OFF_DIAGONAL * np.sqrt(np.outer(relative, relative))
+    apart = np.abs(np.subtract.outer(modes.eigenvalues, modes.eigenvalues))
+    np.fill_diagonal(std, 0.0)
+    std[: modes.n_rigid] = std[:, : modes.n_rigid] = 0.0
+    return np.where(2 * std * np.sqrt(np.outer(own, own)) < least * apart, 0.0, std)
 
 
 def _local_compliance(basis: Basis, layout: Layout, n_modes: int) -> FloatArray:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
+from frf_ipz.diagnosis.model.modes import coupling_scale
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,8 +33,8 @@ class ModalStiffness:
     ----------
     diagonal : (n_points, q) complex array
         Of each mode.
-    coupling : (n_points, q, q) complex array, optional
-        What damping couples them by.
+    coupling : (n_points, r, r) complex array, optional
+        What damping couples the first modes by.
     """
 
     diagonal: ComplexArray
@@ -48,9 +49,12 @@ class ModalStiffness:
         """Give the modal motion under loads, (n_loads, q): (n_points, q, n_loads) complex array."""
         if self.coupling is None:
             return np.asarray(loads.T[None] / self.diagonal[:, :, None])
-        dynamic = self.coupling + self.diagonal[:, :, None] * np.eye(self.diagonal.shape[1])
-        loads_everywhere = np.broadcast_to(loads.T, (len(dynamic), *loads.T.shape))
-        return np.asarray(np.linalg.solve(dynamic, loads_everywhere), np.complex128)
+        r = self.coupling.shape[1]
+        dynamic = self.coupling + self.diagonal[:, :r, None] * np.eye(r)
+        motion = np.empty((*self.diagonal.shape, len(loads)), np.complex128)
+        motion[:, :r] = np.linalg.solve(dynamic, np.broadcast_to(loads[:, :r].T, (len(dynamic), r, len(loads))))
+        motion[:, r:] = loads[:, r:].T / self.diagonal[:, r:, None]
+        return motion
 
     def receptances(self, motions: FloatArray, loads: FloatArray) -> ComplexArray:
         """Give motions, (n_motions, q), under loads, (n_loads, q): (n_points, n_motions, n_loads) complex array."""
@@ -272,6 +276,9 @@ def nuisance_jacobian(response: Response, nuisance_prior: NuisancePrior, layout:
     jacobian[:, :, blocks.stiffness] = products * (omega[i] * omega[j] * nuisance_prior.kappa_std[i, j])
     jacobian[:, :, blocks.mass] = products * nuisance_prior.mu_std[i, j] * (s**2)[:, None, None]
     jacobian[:, :, blocks.damping] = changed * damping * s[:, None, None]
+    own, used = np.sqrt(coupling_scale(omega**2, modes.stated_ratio[:m])), nuisance_prior.is_coupled
+    across = (own[i] * own[j] * nuisance_prior.coupling_std[i, j])[used]
+    jacobian[:, :, blocks.coupling] = products[:, :, used] * across * s[:, None, None]
     jacobian[:, :, blocks.suspension] = (
         -chain * outputs[:, :, rigid] * inputs[:, :, rigid] * nuisance_prior.suspension_std
     )

@@ -146,8 +146,8 @@ def search_component(problem: InferenceProblem, base: Fit) -> Ranking:
             _fit_starts(problem, base, refined, fits)
             if all(fit.is_far_off for fit in fits.values()):
                 _add_beside_nuisance(problem, base, fits)
-        if not base.is_far_off:
-            n_tried += _add_by_score_test(problem, base, fits)
+        if base.is_nearly_right or not (base.is_far_off or any(fit.explains_nearly_all for fit in fits.values())):
+            n_tried += _add_by_score_test(problem, base, fits)  # from far off, what a linear step promises is no match
         if fits and (n_effects := _count_searched_effects(base, fits)):
             search_neighbourhoods(problem, base, fits, n_effects)
         ranked = rank_fits(problem, fits.values())

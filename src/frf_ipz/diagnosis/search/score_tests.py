@@ -6,7 +6,7 @@ of each, at every location. The signatures of effects that are one dynamic stiff
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,7 +26,7 @@ from frf_ipz.diagnosis.search.robust_refinement import Start
 from frf_ipz.numerics.least_squares import cholesky_with_prior
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.diagnosis.catalogue.effect import Parameter, Reading, Signature
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.model.response import Response
 
 BATCH_SIZE = 600  # signatures that are scored together
+LOCATIONS_AT_ONCE = 16  # whose many shapes are scored together: keeps arrays within some ten MB
+NEGLIGIBLE_FUNCTION = 1e-10  # of the largest: what shapes along the contour have of it is rounding
 SMALL_STEP = 1e-5  # of a neutral value, or of a range: so near, everything is linear
 MAX_SCALING = 3.0  # times the size that a signature stands for, where its sizes are fixed
 VANISHING_RATIO = 1.5  # times: the FRFs change by more at the doubled parameter, if an effect vanishes with it
@@ -131,7 +133,9 @@ class ScoreTest:
         white = self.data.slopes(self.response, changes)
         explained = self.explained_by_nuisance(white)
         misfit_explained = self.explained_by_nuisance(self.misfit[:, None])[:, 0]
-        return _best_sizes(self.misfit @ white - misfit_explained @ explained, np.sum(white**2, 0), explained)
+        return _best_sizes(
+            self.misfit @ white - misfit_explained @ explained, np.sum(white**2, 0), np.sum(explained**2, 0)
+        )
 
     def sum_over_points(self) -> ShapeScores:
         """Prepare scores of changes that are one function of FRFs and point times many of the point alone.
@@ -140,7 +144,8 @@ class ScoreTest:
         parameters, and its own square: both are sums over points, whose terms are known before the changes are.
         """
         whitening, n_points = self.data.whitening, len(self.data.measured.s)
-        columns, by_gains = np.column_stack([self.columns, self.misfit]), self.data.gain_directions(self.response)
+        explaining = linalg.solve_triangular(self.factor, self.columns.T, lower=True, check_finite=False).T
+        columns, by_gains = np.column_stack([explaining, self.misfit]), self.data.gain_directions(self.response)
         rows = whitening.transposed(np.hstack([columns - by_gains @ (by_gains.T @ columns), by_gains]))
         rows = np.concatenate([rows, whitening.shared_rows()], axis=2)
         n_frfs = len(self.data.measured.labels)
@@ -148,7 +153,6 @@ class ScoreTest:
         gains = np.sqrt(2.0) * self.data.gains(self.response)[:, None, None]
         factors = gains * whitening.factors
         return ShapeScores(
-            test=self,
             products=np.ascontiguousarray(
                 ((parts[:, 0] - 1j * parts[:, 1]).swapaxes(1, 2) @ factors).transpose(2, 1, 0)
             ),
@@ -167,48 +171,82 @@ class ShapeScores:
 
     Parameters
     ----------
-    test : ScoreTest
-        What is scored on top of.
     products : (n_points, n_rows, n_frfs) complex array
-        Of the FRFs: with the columns of the nuisance, the misfit, and what unknown gains and shared errors take off.
+        Of the FRFs: with orthonormal columns of the nuisance, the misfit, and what unknown gains and shared errors take
+        off.
     squares : (n_frfs, n_points, n_points) complex array
         Of the FRFs, whitened each by itself.
     misfit_explained : (n_nuisance,) array
         What the nuisance explains of the misfit.
     """
 
-    test: ScoreTest
     products: ComplexArray
     squares: ComplexArray
     misfit_explained: FloatArray
+    _known: list[tuple[ComplexArray, ComplexArray, FloatArray]] = field(init=False, default_factory=list, repr=False)
 
-    def score(self, across: ComplexArray, shapes: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    def score_all(
+        self, across: ComplexArray, columns: Sequence[int], shapes: Sequence[ComplexArray]
+    ) -> Iterator[tuple[int, tuple[FloatArray, FloatArray]]]:
         """Find the best sizes of changes, and the gain of each, as `ScoreTest.score_changes` does one by one.
 
         Parameters
         ----------
-        across : (n_points, n_frfs) complex array
+        across : (n_points, n_frfs, n_locations) complex array
             What each shape is multiplied by.
-        shapes : (n_shapes, n_points) complex array
-            Along the contour.
+        columns : sequence of int
+            Locations to be scored.
+        shapes : sequence of (n_shapes, n_points) complex array
+            Along the contour, at each location.
 
-        Returns
-        -------
+        Yields
+        ------
+        column : int
+            A location.
         sizes, gains : (n_shapes,) array
             Sizes may be negative; gains in log-likelihood.
         """
+        for begin in range(0, len(columns), LOCATIONS_AT_ONCE):
+            some = list(columns[begin : begin + LOCATIONS_AT_ONCE])
+            rows = (self.products @ across[:, :, some]).transpose(2, 1, 0)
+            for column, of_location in zip(some, rows, strict=True):
+                yield column, self._score_location(across[:, :, column], of_location, *self._take_apart(shapes[column]))
+
+    def _score_location(
+        self, across: ComplexArray, rows: ComplexArray, basis: ComplexArray, parts: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Score all combinations of a few functions: squares of theirs are quadratic forms of the functions'."""
         n_nuisance = len(self.misfit_explained)
-        rows = ((self.products @ across[:, :, None])[:, :, 0].T @ shapes.T).real
+        by_functions = rows @ basis.T
+        real_rows = np.hstack([by_functions.real, -by_functions.imag])
+        explaining, with_misfit, taken_off = np.split(real_rows, [n_nuisance, n_nuisance + 1])
         by_points = np.einsum("fij,if,jf->ij", self.squares, across.conj(), across, optimize=True)
-        whole = np.sum(shapes.conj() * (shapes @ by_points.T), axis=1).real
-        explained = linalg.solve_triangular(self.test.factor, rows[:n_nuisance], lower=True, check_finite=False)
-        squares = whole - np.sum(rows[n_nuisance + 1 :] ** 2, axis=0)
-        return _best_sizes(rows[n_nuisance] - self.misfit_explained @ explained, squares, explained)
+        between = basis.conj() @ by_points @ basis.T
+        whole = np.block([[between.real, -between.imag], [between.imag, between.real]])
+        squares = _quadratic(parts, whole - taken_off.T @ taken_off)
+        explained = _quadratic(parts, explaining.T @ explaining)
+        return _best_sizes(parts @ (with_misfit[0] - self.misfit_explained @ explaining), squares, explained)
+
+    def _take_apart(self, shapes: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+        """Write shapes as combinations of few functions, (r, n_points): real and imaginary parts, (n_shapes, 2 r)."""
+        for known, basis, parts in self._known:  # the same at all locations
+            if known is shapes:
+                return basis, parts
+        left, sizes, right = linalg.svd(shapes, full_matrices=False, check_finite=False)
+        used = sizes > NEGLIGIBLE_FUNCTION * sizes[0]
+        combined = left[:, used] * sizes[used]
+        self._known.append((shapes, right[used], np.hstack([combined.real, combined.imag])))
+        return self._known[-1][1:]
+
+
+def _quadratic(vectors: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Give the quadratic form of each row, (n,) array."""
+    return np.asarray(np.sum((vectors @ matrix) * vectors, axis=1))
 
 
 def _best_sizes(products: FloatArray, squares: FloatArray, explained: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sizes of changes and their gains: products with the misfit and squares, less what the nuisance explains."""
-    left = np.maximum(squares - np.sum(explained**2, axis=0), 1e-9 * squares + 1e-300)
+    """Sizes of changes and their gains: products with the misfit, squares, and what of these the nuisance explains."""
+    left = np.maximum(squares - explained, 1e-9 * squares + 1e-300)
     return products / left, 0.5 * products**2 / left
 
 
@@ -308,11 +346,13 @@ def _score_signatures(test: ScoreTest, signed: list[tuple[Component, Signature]]
         layout = hypothesis.context.layout
         each = evaluate_receptances(test.response, hypothesis.basis, layout, motions, np.zeros(len(motions))).across
         across = np.add.reduceat(each, firsts, axis=2)
-        for column, (_, signature) in enumerate(group):
-            if of_shapes is not None and len(signature.shapes) > 1:
-                indices = [(first + column, shape) for shape in range(len(signature.shapes))]
-                _keep_best(signed, indices, *of_shapes.score(-across[:, :, column], signature.shapes), best)
-                continue
+        several = [column for column, (_, signature) in enumerate(group) if len(signature.shapes) > 1]
+        if of_shapes is not None:
+            for column, scores in of_shapes.score_all(-across, several, [signature.shapes for _, signature in group]):
+                indices = [(first + column, shape) for shape in range(len(scores[0]))]
+                _keep_best(signed, indices, *scores, best)
+        for column in sorted(set(range(len(group))) - set(several)):
+            signature = group[column][1]
             batch.append((first + column, 0, -across[:, :, column] * signature.shapes[0][:, None]))
             if len(batch) == BATCH_SIZE:
                 _score_batch(test, signed, batch, best)

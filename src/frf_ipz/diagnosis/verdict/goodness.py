@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import IntArray
+from frf_ipz.arrays import FloatArray, IntArray
+from frf_ipz.diagnosis.measured.disagreement import average_over_subbands
 from frf_ipz.diagnosis.model.nuisance import UNIFORM_STD
 
 if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.fit import Data, Fit
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
+    from frf_ipz.diagnosis.model.layout import Layout
 
 ODDS = 20.0  # to one: what is likelier than that is held to be so
 LOG_ODDS = float(np.log(ODDS))
@@ -25,7 +27,6 @@ STRONG_LOG_BAYES_FACTOR = 200.0  # of a second finding: with less, a third one i
 NUISANCE_CHI2_FLOOR = 45.0  # where the data determine few nuisance parameters
 NUISANCE_CHI2_DEVIATIONS = 4.0  # standard deviations of that sum by which it may exceed what the data determine
 MAX_SINGLE_DEVIATION = 3.2  # standard deviations of a damping ratio or gain: 172 tests with nothing missing reached 2.6
-N_SUBBANDS = 6  # of the band, by points
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +106,9 @@ class Goodness:
         Sum of squares of the nuisance parameters, in standard deviations.
     worst_subband : float
         Largest mean square of an FRF over a subband.
+    common_subband : float
+        The same of all FRFs of one channel, or of one excited point, over what records disagree by: what a model lacks
+        is seen by a channel from all excited points, or from one of them by all channels; and it repeats.
     largest_deviation : float
         Largest deviation of a damping ratio or gain, in standard deviations: small others do not make up for it.
     frequency_deviation : float
@@ -118,6 +122,7 @@ class Goodness:
     misfit: float
     nuisance_chi2: float
     worst_subband: float
+    common_subband: float
     largest_deviation: float
     frequency_deviation: float
     limits: Limits
@@ -140,7 +145,8 @@ class Goodness:
             f"leaves {np.sqrt(self.misfit):.3g} times the expected misfit",
             "needs more than the tolerances of the nominal model allow "
             f"({self.nuisance_chi2:.0f} squared deviations, {self.nuisance_chi2_limit:.0f} are likely)",
-            f"leaves {np.sqrt(self.worst_subband):.3g} times the expected misfit in one FRF over a part of the band",
+            f"leaves {np.sqrt(self.common_subband):.3g} times the expected misfit in one channel, or from one excited "
+            "point, over a part of the band",
             f"needs a damping ratio or a gain that is {self.largest_deviation * UNIFORM_STD:.2g} times its tolerance "
             "off",
             f"needs a natural frequency that is {self.frequency_deviation * UNIFORM_STD:.2g} times what the tolerances "
@@ -163,7 +169,7 @@ class Goodness:
         return (
             self.misfit / self.limits.misfit,
             self.nuisance_chi2 / self.nuisance_chi2_limit,
-            self.worst_subband / self.limits.subband,
+            self.common_subband / self.limits.subband,
             (self.largest_deviation / MAX_SINGLE_DEVIATION) ** 2,
             (self.frequency_deviation / self.limits.frequency_deviation) ** 2,
         )
@@ -185,15 +191,15 @@ def assess_goodness(problem: InferenceProblem, fit: Fit) -> Goodness:
         The figures.
     """
     white, nuisance_prior = _whitened_misfit(problem.data, fit), problem.nuisance_prior
-    subbands = [subband for subband in np.array_split(white, N_SUBBANDS, axis=2) if subband.size]
-    worst = max(float(np.mean(subband**2, axis=(1, 2)).max()) for subband in subbands)
+    subbands = average_over_subbands(white)
     nuisance_chi2_limit = max(
         NUISANCE_CHI2_FLOOR, fit.n_determined + NUISANCE_CHI2_DEVIATIONS * np.sqrt(2 * fit.n_determined)
     )
     return Goodness(
         misfit=float(np.mean(white**2)),
         nuisance_chi2=fit.nuisance_chi2,
-        worst_subband=worst,
+        worst_subband=float(subbands.max()),
+        common_subband=_find_common(problem.context.layout, subbands / problem.disagreement),
         largest_deviation=_largest_deviation(
             fit, np.concatenate([nuisance_prior.damping_indices[nuisance_prior.is_stated], nuisance_prior.gain_indices])
         ),
@@ -201,6 +207,12 @@ def assess_goodness(problem: InferenceProblem, fit: Fit) -> Goodness:
         limits=LIMITS[problem.kind],
         nuisance_chi2_limit=float(nuisance_chi2_limit),
     )
+
+
+def _find_common(layout: Layout, subbands: FloatArray) -> float:
+    """Find the largest mean over the FRFs of a channel or of an excited point, (n_frfs, n_subbands)."""
+    groups = [index == one for index in (layout.output_index, layout.input_index) for one in np.unique(index)]
+    return max(float(subbands[group].mean(axis=0).max()) for group in groups)
 
 
 def _largest_deviation(fit: Fit, indices: IntArray) -> float:

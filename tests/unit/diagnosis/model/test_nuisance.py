@@ -70,7 +70,7 @@ def test_modes_that_shear_brings_into_the_band_scatter(tmp_path, thickness_m, br
 
 def test_each_parameter_stands_in_one_block():
     blocks = NuisanceBlocks.in_order(
-        stiffness=3, mass=3, damping=2, suspension=1, output_shifts=4, input_shifts=2, local=2, gains=3
+        stiffness=3, mass=3, damping=2, coupling=1, suspension=1, output_shifts=4, input_shifts=2, local=2, gains=3
     )
-    in_turn = np.concatenate([np.arange(20)[getattr(blocks, name)] for name in NuisanceBlocks.__dataclass_fields__])
-    assert in_turn.tolist() == list(range(20))
+    in_turn = np.concatenate([np.arange(21)[getattr(blocks, name)] for name in NuisanceBlocks.__dataclass_fields__])
+    assert in_turn.tolist() == list(range(21))

@@ -7,9 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from diagnosed import beam, labels, lumped, measured, problem_of
-from frf_ipz.diagnosis.evidence.hypothesis import Component
+from frf_ipz.diagnosis.evidence.hypothesis import Component, make_hypothesis
 from frf_ipz.diagnosis.model import basis as bases
-from frf_ipz.diagnosis.model.response import ModalStiffness
+from frf_ipz.diagnosis.model.response import ModalStiffness, nuisance_jacobian
 
 DIGITS = 1e-9
 
@@ -78,3 +78,32 @@ def test_modes_of_the_nominal_structure_are_solved_for_once(problem, monkeypatch
     for factor in range(1, 8):
         hypothesis.modes(factor * values, np.zeros(problem.nuisance_prior.size))
     assert len(solved) == 1
+
+
+def test_damping_that_is_not_proportional_couples_modes(problem):
+    """What the nuisance couples two modes by is a damping matrix between them, beyond first order too."""
+    s, n_modes = problem.data.measured.s, problem.nuisance_prior.n_modes
+    std = 0.1 * (1 - np.eye(n_modes))
+    prior = replace(problem.nuisance_prior, coupling_std=std)
+    hypothesis, drawn = make_hypothesis(problem.context, prior, ()), np.random.default_rng(5)
+    nuisance = 0.5 * drawn.standard_normal(prior.size)
+    nuisance[prior.blocks.coupling] = 4.0 * drawn.standard_normal(n_modes * (n_modes - 1) // 2)
+    response = hypothesis.respond(np.zeros(0), nuisance, s)
+    jacobian = nuisance_jacobian(response, prior, problem.context.layout)
+    for index in (prior.blocks.coupling.start, prior.blocks.coupling.stop - 1):
+        step = 1e-4 * (np.arange(prior.size) == index)
+        ahead, behind = (hypothesis.respond(np.zeros(0), nuisance + sign * step, s).values for sign in (1, -1))
+        change = (ahead - behind) / 2e-4
+        assert_allclose(jacobian[:, :, index], change, rtol=0, atol=1e-5 * np.abs(change).max())
+    uncoupled = nuisance.copy()
+    uncoupled[prior.blocks.coupling] = 0.0
+    if problem.context.basis.model.modal_damping.any():
+        assert not np.allclose(hypothesis.respond(np.zeros(0), uncoupled, s).values, response.values, rtol=1e-4, atol=0)
+
+
+@pytest.mark.parametrize(("ratio", "couples"), [(0.02, True), (1e-4, False)])
+def test_damping_couples_modes_that_are_not_far_apart_for_their_bandwidths(tmp_path, ratio, couples):
+    model = replace(beam(tmp_path), modal_damping=np.array([ratio]))
+    prior = problem_of(model, measured(model, labels()), ()).nuisance_prior
+    assert prior.is_coupled.any() == couples
+    assert not np.diag(prior.coupling_std).any()

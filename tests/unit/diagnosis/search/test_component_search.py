@@ -3,7 +3,9 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
+from frf_ipz.diagnosis.search import component_search
 from frf_ipz.diagnosis.search.component_search import _promising, _with_location_prior
 from frf_ipz.diagnosis.search.robust_refinement import GAIN, Start
 
@@ -34,3 +36,23 @@ def test_effects_that_promise_too_little_are_not_fitted_and_those_that_were_not_
 def test_one_of_many_places_promises_something_by_chance():
     (start,) = _with_location_prior([scored("mass", 3, -90.0)])
     np.testing.assert_allclose(start.cost, -90.0 + np.log(20))
+
+
+@pytest.mark.parametrize(("base_is_nearly_right", "is_explained", "is_scored"), [
+    (False, False, True), (False, True, False), (True, True, True),
+])  # fmt: skip
+def test_nothing_is_scored_from_far_off_where_one_effect_explains_nearly_all(
+    monkeypatch, base_is_nearly_right, is_explained, is_scored
+):
+    """What a linear step promises from a model that is far off is no match for what explains nearly all."""
+    scored = []
+    base = SimpleNamespace(explains_nearly_all=False, is_far_off=False, is_nearly_right=base_is_nearly_right)
+    fit = SimpleNamespace(explains_nearly_all=is_explained, is_far_off=False)
+    monkeypatch.setattr(component_search, "scan_globally", lambda *_: [])
+    monkeypatch.setattr(component_search, "refine_starts", lambda *_: [])
+    monkeypatch.setattr(component_search, "_fit_starts", lambda *given: given[-1].update(key=fit))
+    monkeypatch.setattr(component_search, "_add_by_score_test", lambda *_: scored.append(1) or 0)
+    monkeypatch.setattr(component_search, "_count_searched_effects", lambda *_: 0)
+    monkeypatch.setattr(component_search, "rank_fits", lambda _, fits: tuple(fits))
+    component_search.search_component(None, base)
+    assert bool(scored) == is_scored

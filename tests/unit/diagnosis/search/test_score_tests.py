@@ -42,7 +42,7 @@ def test_shapes_are_scored_together_as_they_are_one_by_one(base, free_gains, is_
     drawn = rng.standard_normal((2, n_points, n_frfs))
     across = test.response.values * (drawn[0] + 1j * drawn[1])
     shapes = rng.standard_normal((N_SHAPES, n_points)) + 1j * rng.standard_normal((N_SHAPES, n_points))
-    together = test.sum_over_points().score(across, shapes)
+    ((_, together),) = test.sum_over_points().score_all(across[:, :, None], [0], [shapes])
     one_by_one = test.score_changes(np.stack([across * shape[:, None] for shape in shapes], 2))
     for values, expected in zip(together, one_by_one, strict=True):
         np.testing.assert_allclose(values, expected, rtol=EXACT, atol=0)
