@@ -179,8 +179,8 @@ def _add_and_drop(search: _Search, start: RefinedPoles) -> tuple[RefinedPoles, G
     search.noise_is_trusted = search.noise_is_known
     fit, goodness = _drop_insignificant(search, start, spurious_too=False)
     in_vain = np.zeros(0, complex)  # proposed beside the same fit before
-    for _ in range(ROUNDS):
-        fit, goodness = _without_drift(search, fit, goodness)
+    for number in range(ROUNDS):
+        fit, goodness = _without_drift(search, fit, goodness, is_start=number == 0)
         proposed = _proposed_poles(search, goodness)
         if not len(proposed) or np.array_equal(proposed, in_vain):
             break
@@ -368,8 +368,11 @@ def _reason(goodness: GoodnessOfFit, number: int, spurious: str) -> str:
     return spurious
 
 
-def _without_drift(search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit) -> tuple[RefinedPoles, GoodnessOfFit]:
-    drift_and_fit = None if search.drift else _drift_beside_modes(search, fit, goodness)
+def _without_drift(
+    search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit, *, is_start: bool
+) -> tuple[RefinedPoles, GoodnessOfFit]:
+    find = _drift_beside_modes if is_start else _drift_of_all
+    drift_and_fit = None if search.drift else find(search, fit, goodness)
     if drift_and_fit is None:
         return fit, goodness
     search.drift, fit_without_drift = drift_and_fit
@@ -389,6 +392,10 @@ def _drift_beside_modes(
         found = find_drift(search.data, one_a_peak, search.terms)
         if found is not None and found[1].misfit < fit.misfit:
             return found
+    return _drift_of_all(search, fit, goodness)
+
+
+def _drift_of_all(search: _Search, fit: RefinedPoles, _goodness: GoodnessOfFit) -> tuple[Drift, RefinedPoles] | None:
     return find_drift(search.data, fit, search.terms)
 
 
