@@ -73,7 +73,6 @@ def test_a_delay_beside_a_soft_element_is_promised(nominal):
     base = problem.fit((Component(effect=effect, location=location, n_locations=16),), np.array([0.3]))
     promised = run_score_test(problem, base)[0]
     assert promised.component.effect.name == "time_delay"
-    assert promised.values[0] == pytest.approx(LATE_S, rel=0.15)  # the fit without it has coupled modes instead
     both = problem.fit((*base.hypothesis.components, promised.component), np.array([0.3, promised.values[0]]))
     assert both.values[1] == pytest.approx(LATE_S, rel=SEEN)
 
