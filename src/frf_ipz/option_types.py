@@ -20,7 +20,7 @@ ISO_DAY = re.compile(r"\d{4}-\d{2}-\d{2}")
 
 
 def _require_size(value: float) -> float:
-    if value < SMALLEST:
+    if 0.0 < value < SMALLEST:
         raise ValueError(f"must be greater than {SMALLEST:g}: smaller sizes are those of nothing")
     return value
 
@@ -41,7 +41,7 @@ def _require_day(value: object) -> str:
 
 
 Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False, strict=True), AfterValidator(_require_size)]
-NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False, strict=True)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False, strict=True), AfterValidator(_require_size)]
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Ratio = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False, strict=True)]
 Frequency = Annotated[float, Field(ge=0, le=LARGEST_HZ, allow_inf_nan=False, strict=True)]

@@ -134,6 +134,9 @@ def test_a_coherence_in_per_cent_or_above_1(tmp_path):
     result = estimate(tmp_path, coherence=(1.5 * coherence).tolist())
     assert np.isnan(result.frfs.coherence).all()
     assert "goes up to 1.485, at 300 Hz, and none is above 1: left out" in result.warnings[0]
+    mistyped = np.where(np.arange(301) == 40, 37.2, coherence)
+    result = estimate(tmp_path, coherence=mistyped.tolist())
+    assert "goes up to 37.2, at 40 Hz, and none is above 1: left out" in result.warnings[0]
     coherence[40] = -0.02
     text = message(tmp_path, coherence=coherence.tolist())
     assert "the FRF 1:+z / 7:+z has the coherence -0.02 at 40 Hz, below zero" in text

@@ -156,8 +156,9 @@ def test_a_count_of_samples_needs_a_rate(tmp_path, name):
 def test_a_rate_that_contradicts_the_time_is_refused(tmp_path):
     path = write(tmp_path, str)
     expect(read(path, "sample_rate_hz = 2048.0"))
-    text = message(path, "sample_rate_hz = 1024.0")
-    assert re.search(r"sample_rate_hz = 1024, but its column 'time' has a mean step.*2048 Hz", text)
+    for rate_hz in (1024, 2047):
+        text = message(path, f"sample_rate_hz = {rate_hz}.0")
+        assert re.search(rf"sample_rate_hz = {rate_hz}, but its column 'time' has a mean step.*2048 Hz", text)
 
 
 def test_a_frequency_is_no_time(tmp_path):
@@ -300,8 +301,9 @@ def test_text_among_the_numbers_is_refused(tmp_path):
         "2048\n3\n",
         "Date,27/03/2025,x,y\n",
         "Channel,Input,Range,Coupling\n1,Dev1/ai0,5 V,IEPE\n2,Dev1/ai1,5 V,IEPE\n",
+        "rig,7,2,11\nparam 1,1.5,1\n1,2,3,4\n\ncal,2.25,10.1,9.9\n\n",
     ],
-    ids=["pairs", "sentences", "comments", "long", "numbers", "as wide as the table", "table of channels"],
+    ids=["pairs", "sentences", "comments", "long", "numbers", "wide", "table of channels", "numbers above text"],
 )
 def test_text_above_the_names_is_left_out(tmp_path, preamble):
     expect(read(write(tmp_path, lambda text: preamble + text)))

@@ -140,7 +140,7 @@ def _check_coherence(frf: MeasuredFrf) -> MeasuredFrf:
     name = f"{frf.source.path.name}, {frf.label}"
     if largest <= 1.0 + PRINTED:
         return replace(frf, coherence=np.minimum(coherence, 1.0))
-    if PER_CENT < largest <= 100.0 * (1.0 + PRINTED):
+    if PER_CENT < largest <= 100.0 * (1.0 + PRINTED) and np.nanmedian(coherence) > 1.0:
         note = f"{name}: the coherence goes up to {largest:g}: taken as per cent"
         return replace(frf, coherence=np.minimum(coherence / 100.0, 1.0), notes=(*frf.notes, note))
     hertz = frf.frequency_hz[np.nanargmax(coherence)]

@@ -11,6 +11,7 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats.recording import LARGEST, RawRecording, RecordingContents, SignalColumn
+from frf_ipz.ingest.formats.signal_table import SAME_CLOCK, SAME_RATE
 from frf_ipz.ingest.formats.text_columns import (
     TIME,
     find_columns,
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.text_layout import TextLayout
 else:
     pa = import_late("pyarrow")
-
-SAME_RATE = 0.01  # the contract's limit for a step that differs
 
 
 class _CsvRecordings:
@@ -98,8 +97,8 @@ def _by_rate(
         return
     unit = found.units[found.time]
     step_s = (last - first) / (n_rows - 1) * (unit_factor(unit, "time") if unit else 1.0)
-    rounded = 0.0 if found.holds_stamps else printed_resolution(layout, found.time) / (last - first)
-    if abs(step_s * sample_rate_hz - 1.0) > SAME_RATE + rounded * step_s * sample_rate_hz:
+    rounded = SAME_RATE if found.holds_stamps else printed_resolution(layout, found.time) / (last - first)
+    if abs(step_s * sample_rate_hz - 1.0) > SAME_CLOCK + rounded * step_s * sample_rate_hz:
         problem = (
             f"[test] sample_rate_hz = {sample_rate_hz:g}, but its column '{found.names[found.time]}' has a mean step "
             f"of {step_s:.6g} s, which is {1.0 / step_s:.6g} Hz; correct sample_rate_hz, or leave it out"

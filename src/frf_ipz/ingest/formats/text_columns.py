@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.recording import TableKeys
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
+OTHER_HEADER = "; where another line names the columns, write header_row = ... under [test]"
 EVEN = 0.02  # of the step between printed times: twice what the contract allows, since digits are rounded
 LETTERS_SHOWN, NAMES_SHOWN = 40, 10  # of names of columns, in a message
 FEWEST_ROWS = 3  # two steps can be compared
@@ -244,6 +245,7 @@ def _read_header(layout: TextLayout, header_row: int | None, columns: Sequence[s
     if faulty is not None:
         line = layout.header_lines[position + 1 + faulty]
         problem = f"holds '{below[faulty][0]}' where a number is expected; correct the line, or take it out"
+        problem += OTHER_HEADER
         raise FileFormatError(layout.path, problem, where=f"line {line}, column '{names[0]}'")
     wide = [row for row in rows[position + 1 :] if row is not None]
     unit_rows = wide if len(below) == 1 else [row for row in wide if _is_row_of_units(row)]
@@ -300,8 +302,7 @@ def _match_width(layout: TextLayout, fields: Sequence[str]) -> list[str] | None:
 def _wrong_width(layout: TextLayout, fields: Sequence[str]) -> FileFormatError:
     problem = f"has {counted(layout.n_columns, 'value')} where the header has {counted(len(fields), 'column')}"
     hint = "; a decimal comma needs semicolons or tabs between the columns" if layout.delimiter == "," else ""
-    hint += "; where another line names the columns, write header_row = ... under [test]"
-    return FileFormatError(layout.path, problem + hint, where=f"line {layout.n_before + 1}")
+    return FileFormatError(layout.path, problem + hint + OTHER_HEADER, where=f"line {layout.n_before + 1}")
 
 
 def _find_time(

@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING, BinaryIO
 
 from frf_ipz import text_numbers
@@ -367,12 +367,16 @@ def _first_row(kept: Sequence[int], split: dict[int, list[str]]) -> int | None:
     whole = next((index for index in numbers if numbers[index] >= most), -1)
     text = max((index for index in kept if index < whole and index not in numbers), default=-1)
     begins = [index for index in begins if index > text]
-    following = dict(pairwise(kept))
-    for index in begins:
-        below = split.get(following.get(index, -1))
-        if len(split[index]) == usual and (below is None or any(map(_begins_row, below))):
-            return index
-    return next((index for index in begins if len(split[index]) == usual), None)
+    begins = [index for index in begins if len(split[index]) == usual]
+    following = {index: split.get(after) for index, after in pairwise([*kept, -1])}
+    goes_on = (index for index in begins if _begins_as_row(following[index]))
+    holds_numbers = (index for index in begins if any(map(_begins_row, following[index] or ["0"])))
+    return next(chain(goes_on, holds_numbers, begins), None)
+
+
+def _begins_as_row(fields: list[str] | None) -> bool:
+    """Tell a line of numbers, the first of which may be missing, and the end of the file, from text with numbers."""
+    return fields is None or not fields[0] or _is_entry(fields[0])
 
 
 def _find_stop(stream: BinaryIO, start: int, delimiter: str, n_columns: int) -> int:
