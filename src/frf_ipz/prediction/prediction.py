@@ -12,6 +12,8 @@ from frf_ipz.frf import FrfLabel
 from frf_ipz.rational import ZeroSet
 from frf_ipz.visible_text import counted
 
+ONE_SIDED = 0.25  # of the half width: a band that reaches less far to one side is given by both sides
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Prediction(Tabulated, Drawn):
@@ -87,6 +89,30 @@ class Prediction(Tabulated, Drawn):
         is_known = np.isfinite(ratios).any(axis=0)
         widths[is_known] = 10 * np.log10(np.nanmedian(ratios[:, is_known], axis=0))
         return widths
+
+    def band_db_text(self, frf: int) -> str:
+        """Say how far the 90 % band of an FRF reaches, the median over its lines.
+
+        Parameters
+        ----------
+        frf : int
+            Its place among the labels.
+
+        Returns
+        -------
+        str
+            ``+-0.28 dB``, or ``-0.03 to +0.53 dB`` where it lies on one side of the prediction, as where the mass of
+            the model is in doubt.
+        """
+        half = float(self.half_width_db[frf])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            size = np.abs(self.values[:, frf])
+            edges = np.array([self.magnitude_low[:, frf] / size, self.magnitude_high[:, frf] / size])
+        known = np.isfinite(edges).all(axis=0) & (edges > 0).all(axis=0)
+        low, high = 20 * np.log10(np.median(edges[:, known], axis=1)) if known.any() else (-half, half)
+        if min(-low, high) >= ONE_SIDED * half:
+            return f"+-{half:.2g} dB"
+        return f"{low:+.2g} to {high:+.2g} dB"
 
     @property
     def band_text(self) -> str:

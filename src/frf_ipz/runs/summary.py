@@ -316,7 +316,7 @@ def prediction_lines(prediction: Prediction) -> list[tuple[str, str]]:
     lines = []
     for index in order[:MOST_PREDICTIONS]:
         shape = ", its shape only" if index in prediction.relative else ""
-        band = f", 90 % band +-{widths[index]:.2g} dB ({prediction.band_text}, median)"
+        band = f", 90 % band {prediction.band_db_text(index)} ({prediction.band_text}, median)"
         lines.append(("prediction", f"{prediction.labels[index]}{shape}{band if np.isfinite(widths[index]) else ''}"))
     if len(order) > MOST_PREDICTIONS:
         lines.append(("", f"and {len(order) - MOST_PREDICTIONS} more, with narrower bands"))

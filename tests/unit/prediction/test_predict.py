@@ -16,7 +16,9 @@ from frf_ipz.numerics.damped_modes import receptance_roots
 from frf_ipz.prediction import ensemble as ensembles
 from frf_ipz.prediction.advice import WIDE_DB, wide_bands
 from frf_ipz.prediction.predict import predict_frfs
+from frf_ipz.prediction.prediction import Prediction
 from frf_ipz.quantities import FrfQuantity
+from frf_ipz.rational import ZeroSet
 from frf_testbench.updating.study import make_update_case, study_structure
 from measured_labels import measured
 
@@ -212,3 +214,24 @@ def test_roots_of_an_ensemble_are_found_once_for_all_its_bands(monkeypatch):
     for points in (POINTS[:1], POINTS[1:]):
         predict_frfs(measured(LABELS), result, points=points, frequency_hz=LINES)
     assert len(found) == 5
+
+
+@pytest.mark.parametrize(
+    ("low_db", "high_db", "expected"),
+    [(-0.5, 0.5, "+-0.5 dB"), (-0.03, 0.53, "-0.03 to +0.53 dB"), (-0.4, 0.05, "-0.4 to +0.05 dB")],
+)
+def test_a_band_on_one_side_is_given_by_both_sides(low_db, high_db, expected):
+    values = np.exp(1j * np.linspace(0.0, 2.0, 50))[:, None]
+    prediction = Prediction(
+        frequency_hz=np.linspace(10.0, 100.0, 50),
+        labels=(label(1, 2),),
+        values=values,
+        nominal=values,
+        magnitude_low=np.full((50, 1), 10 ** (low_db / 20)),
+        magnitude_high=np.full((50, 1), 10 ** (high_db / 20)),
+        zeros=ZeroSet(
+            values=np.zeros(0, complex), frf=np.zeros(0, int), kind=(), identifiable=np.zeros(0, bool), reason=()
+        ),
+        zero_std=np.zeros((0, 2)),
+    )
+    assert prediction.band_db_text(0) == expected

@@ -43,6 +43,7 @@ def band_width(evidence: Evidence) -> Iterator[Check]:
         return
     worst = int(np.nanargmax(widths))
     width, where = float(widths[worst]), str(prediction.labels[worst])
+    reach = prediction.band_db_text(worst).replace("+-", "±")
     yield Check(
         name="band at the points of interest",
         verdict=judge(width, SIXTH * GAIN_MARGIN_DB, HALF * GAIN_MARGIN_DB),
@@ -50,7 +51,7 @@ def band_width(evidence: Evidence) -> Iterator[Check]:
         limit=SIXTH * GAIN_MARGIN_DB,
         unit="dB",
         where=where,
-        says=f"the 90 % band of {where} is ±{width:.2g} dB ({prediction.band_text}, median)",
+        says=f"the 90 % band of {where} is {reach} ({prediction.band_text}, median)",
         advice="measure nearer to the point, or at more points" if width > SIXTH * GAIN_MARGIN_DB else "",
     )
 

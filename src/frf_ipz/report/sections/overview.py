@@ -175,9 +175,9 @@ def _of_update(run: Results) -> str:
     prediction = run.prediction
     if prediction is not None and np.isfinite(prediction.half_width_db).any():
         worst = int(np.nanargmax(prediction.half_width_db))
-        width = number(float(prediction.half_width_db[worst]), 2)
+        reach = prediction.band_db_text(worst).replace("+-", "±")
         shape = "the shape of " if worst in prediction.relative else ""
-        text += f", and predicts {shape}{prediction.labels[worst]} to ±{width} dB"
+        text += f", and predicts {shape}{prediction.labels[worst]} {'to' if '±' in reach else 'with'} {reach}"
         text += f" (90 % band, {prediction.band_text}, median)"
         others = len(prediction.labels) - 1
         text += f" and {counted(others, 'other FRF')} to less" if others else ""
