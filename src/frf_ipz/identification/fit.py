@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
+from scipy.special import gammaincinv
 
 from frf_ipz.arguments import require_type, take_array
 from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
@@ -64,6 +65,7 @@ else:
     pd = import_late("pandas")
 
 FRFS_SHOWN = 6
+CHANCE = 1e-3  # that the noise of some FRF is known so badly that it is said to be missed
 NOISE_ROUNDS = 3  # of fitting residues and estimating the noise in turn
 
 
@@ -322,6 +324,12 @@ def _root_covariance(errors: FitErrors, zeros: ZerosWithErrors, modes: IntArray,
     return RootCovariance(common=sources, blocks=sparse.csr_array(blocks + infinite))
 
 
+def _by_chance(frfs: FrfSet) -> FloatArray:
+    """Misfit over noise, (n_frfs,), that the scatter of a few records makes by chance, all lines alike at worst."""
+    n_free = np.maximum(frfs.averages - 1.0, 1.0)  # complex numbers that tell the noise
+    return np.where(frfs.averages > 1, np.sqrt(n_free / gammaincinv(n_free, CHANCE / frfs.n_frfs)), 1.0)
+
+
 def _warnings(
     frfs: FrfSet, fitted: FittedModes, halves: SplitHalf | None, unconfirmed: tuple[str, ...]
 ) -> tuple[str, ...]:
@@ -342,8 +350,8 @@ def _warnings(
             "no linear model with these modes describes the structure to within the noise, so standard deviations are "
             "taken from the misfit"
         )
-    elif (ratio > MODEL_ERROR).any():
-        worst_first = [int(frf) for frf in np.argsort(-ratio) if ratio[frf] > MODEL_ERROR]
+    elif (missed := ratio > np.maximum(MODEL_ERROR, _by_chance(frfs))).any():
+        worst_first = [int(frf) for frf in np.argsort(-ratio) if missed[frf]]
         listed = ", ".join(f"{frfs.labels[frf]} {ratio[frf]:.3g}" for frf in worst_first[:FRFS_SHOWN])
         texts.append(
             f"the fit misses {counted(len(worst_first), 'FRF')} of {len(ratio)} by more than noise, times the noise: "
