@@ -176,8 +176,9 @@ def _of_update(run: Results) -> str:
     if prediction is not None and np.isfinite(prediction.half_width_db).any():
         worst = int(np.nanargmax(prediction.half_width_db))
         reach = prediction.band_db_text(worst).replace("+-", "±")
+        reach = reach if "±" in reach else f"between {reach.replace(' to ', ' and ')}"
         shape = "the shape of " if worst in prediction.relative else ""
-        text += f", and predicts {shape}{prediction.labels[worst]} {'to' if '±' in reach else 'with'} {reach}"
+        text += f", and predicts {shape}{prediction.labels[worst]} to {reach}"
         text += f" (90 % band, {prediction.band_text}, median)"
         others = len(prediction.labels) - 1
         text += f" and {counted(others, 'other FRF')} to less" if others else ""
