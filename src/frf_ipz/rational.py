@@ -7,13 +7,12 @@ Poles and zeros are kept once per conjugate pair, with the imaginary part that i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray, require_shape
 from frf_ipz.display import Concise
-from frf_ipz.frf import FrfSet
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -231,28 +230,3 @@ def underdamped_poles(natural_frequency: FloatArray, damping: FloatArray) -> Com
     """
     omega = 2 * np.pi * natural_frequency
     return omega * (-damping + 1j * np.sqrt(1 - damping**2))
-
-
-def without_window(frfs: FrfSet, model: PoleResidueModel) -> FrfSet:
-    """Carry FRFs that were measured under an exponential window over to the imaginary axis.
-
-    The windowed values are exact at s = sigma + i omega. What the fitted model changes between there and i omega is
-    added to them: noise and whatever the model does not contain stay as they were measured.
-
-    Parameters
-    ----------
-    frfs : FrfSet
-        Measured, with a window or without.
-    model : PoleResidueModel
-        Fitted to them.
-
-    Returns
-    -------
-    FrfSet
-        Without a window.
-    """
-    if not frfs.window_decay_1_s:
-        return frfs
-    s = np.where(frfs.frequency_hz > 0, 2j * np.pi * frfs.frequency_hz, 2j * np.pi * frfs.frequency_hz[1])
-    difference = np.where(frfs.frequency_hz[:, None] > 0, model(s) - model(frfs.s), 0.0)
-    return replace(frfs, values=frfs.values + difference, window_decay_1_s=0.0)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray, require_shape
 from frf_ipz.display import Drawn, Tabulated
 from frf_ipz.errors import ShapeError
-from frf_ipz.frf import FrfLabel
+from frf_ipz.frf import FrfLabel, FrfSet
 from frf_ipz.identification.options import Stability
-from frf_ipz.identification.root_covariance import RootCovariance
+from frf_ipz.identification.root_covariance import RootCovariance, pair_blocks
 from frf_ipz.late_imports import import_late
 from frf_ipz.modes import ModalParameters
 from frf_ipz.rational import PoleResidueModel, ZeroSet, natural_frequency_hz
@@ -132,6 +134,41 @@ class ModalFit(Tabulated, Drawn):
     def connections(self) -> tuple[FrfLabel, ...]:
         """What a model's FRFs connect: `labels`, or sensors and forces of modes that were identified elsewhere."""
         return self.labels if self.modes_given is None else self.modes_given.labels
+
+    def without_window(self, frfs: FrfSet) -> FrfSet:
+        """Carry FRFs that were measured under an exponential window over to the imaginary axis.
+
+        The windowed values are exact at s = sigma + i omega. What the fitted model changes between there and i omega is
+        added to them: noise and whatever the model does not contain stay as they were measured. What is not known of
+        poles and residues counts in the variance, as if both were independent.
+
+        Parameters
+        ----------
+        frfs : FrfSet
+            What was fitted, with a window or without.
+
+        Returns
+        -------
+        FrfSet
+            Without a window.
+        """
+        if not frfs.window_decay_1_s:
+            return frfs
+        is_carried = frfs.frequency_hz > 0  # at 0 Hz the model may have no value
+        s, at_window = 2j * np.pi * np.where(is_carried, frfs.frequency_hz, frfs.frequency_hz[1]), frfs.s
+        poles, residues = self.model.poles[: self.n_modes], self.model.residues[: self.n_modes]
+        by_residue, by_pole = (
+            np.abs((s[:, None] - poles) ** -power - (at_window[:, None] - poles) ** -power) ** 2 for power in (1, 2)
+        )
+        pole_variance = np.trace(pair_blocks(self.covariance)[: self.n_modes], axis1=1, axis2=2)
+        added = by_pole @ (pole_variance[:, None] * np.abs(residues) ** 2)
+        added += by_residue @ np.trace(self.residue_covariance, axis1=2, axis2=3)
+        return replace(
+            frfs,
+            values=frfs.values + np.where(is_carried[:, None], self.model(s) - self.model(at_window), 0.0),
+            variance=frfs.variance + np.where(is_carried[:, None], added, 0.0),
+            window_decay_1_s=0.0,
+        )
 
     def __repr__(self) -> str:
         values = [f"{hertz:.2f}" for hertz in natural_frequency_hz(self.model.poles[: self.n_modes])]

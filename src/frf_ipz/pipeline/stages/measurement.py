@@ -12,7 +12,6 @@ from frf_ipz.frf import FrfSet
 from frf_ipz.ingest.estimate import estimate_from
 from frf_ipz.late_imports import import_late
 from frf_ipz.pipeline.stages.mismatch import corrections
-from frf_ipz.rational import without_window
 from frf_ipz.runs.digests import digest_arrays
 
 if TYPE_CHECKING:
@@ -119,7 +118,7 @@ def _files_of_fit(frfs: FrfSet, result: ModalFit) -> Writers:
         return files
     return {
         **files,
-        "frf.parquet": partial(write_table, tables.frf_table(without_window(frfs, result.model))),
+        "frf.parquet": partial(write_table, tables.frf_table(result.without_window(frfs))),
         "zeros.parquet": partial(write_table, tables.zero_table(result)),
         "fit.parquet": partial(write_table, tables.misfit_table(result)),
     }

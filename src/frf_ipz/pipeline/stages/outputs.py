@@ -15,7 +15,6 @@ from frf_ipz.frf import FrfSet
 from frf_ipz.late_imports import import_late
 from frf_ipz.pipeline.stages.delays import known_delays
 from frf_ipz.pipeline.stages.mismatch import effects_of
-from frf_ipz.rational import without_window
 from frf_ipz.runs.digests import digest_arrays
 from frf_ipz.runs.results import Results
 
@@ -237,7 +236,7 @@ def files(runner: StageRunner, modal_fit: ModalFit, frfs: FrfSet) -> None:
     if not asked:
         runner.store.mark_stale(("files",))
         return
-    measured = without_window(frfs, modal_fit.model)
+    measured = modal_fit.without_window(frfs)
     geometry = _geometry(runner)
     places = "" if geometry is None else digest_arrays([geometry.nodes, geometry.coordinates_m, geometry.lines])
     key = runner.make_key("files", {"after": runner.after("fit"), "asked": sorted(asked), "places": places})
