@@ -64,7 +64,7 @@ if TYPE_CHECKING:
 else:
     pd = import_late("pandas")
 
-FRFS_SHOWN = 6
+FRFS_SHOWN = 6  # in one warning
 CHANCE = 1e-3  # that the noise of some FRF is known so badly that it is said to be missed
 NOISE_ROUNDS = 3  # of fitting residues and estimating the noise in turn
 

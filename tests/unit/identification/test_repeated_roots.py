@@ -116,6 +116,14 @@ def test_gains_and_noise_make_no_second_mode_and_hide_none(gains, noise):
     assert found > 0.7 * n_repeated
 
 
+def test_residues_without_an_error_are_told_too():
+    rng = np.random.default_rng(SEED)
+    first, second = (rng.standard_normal((3, 4, 1)) * rng.standard_normal((3, 1, 3)) for _ in range(2))
+    products = first + np.array([0.0, 1.0, 0.0])[:, None, None] * second
+    probability = _probability_of_rank_two(products.astype(complex), np.zeros(products.shape))
+    assert (probability > BEYOND_DOUBT).tolist() == [False, True, False]
+
+
 def two_axes(*, repeated, seed):
     """Vertical and horizontal ports: what crosses over is a thousand times smaller, and its noise as well."""
     truth = random_modes([60.0, 110.0, 110.0 if repeated else 130.0, 160.0], 0.01, n_outputs=6, n_inputs=6, seed=seed)

@@ -76,7 +76,8 @@ def _probability_of_rank_two(products: ComplexArray, variance: FloatArray) -> Fl
     squares = np.abs(products) ** 2
     by_row, by_column = squares.sum(axis=2, keepdims=True), squares.sum(axis=1, keepdims=True)
     expected = by_row * by_column / squares.sum(axis=(1, 2), keepdims=True)
-    total = variance + GAINS[:, None, None, None] ** 2 * expected
+    rounding = np.finfo(float).eps ** 2 * squares.mean(axis=(1, 2), keepdims=True)
+    total = np.maximum(variance, rounding) + GAINS[:, None, None, None] ** 2 * expected
     n_left = [(n_outputs - rank) * (n_inputs - rank) for rank in (1, 2)]
     log_error, log_size = np.log(total).mean(axis=(2, 3)), np.log(squares.mean(axis=(1, 2)))
     one, two = (

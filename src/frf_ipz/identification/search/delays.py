@@ -45,9 +45,7 @@ ROUNDS = 2  # of finding delays and poles in turn
 MOST = 0.5  # of the misfit, and of the modes
 FEWEST_MODES = 3  # whose phases tell a delay from complex modes
 FALSE_CLAIM = 1e-3  # chance that random phases of any channel are taken for a delay
-PATTERNS = (
-    2  # of phases that differ, in each period of the highest frequency that delays are tried over: q repeats by pi
-)
+PATTERNS = 2  # of phases that differ, in each period of the highest frequency that is tried: q repeats by pi
 CHANCE = 0.05  # that delays of FRFs, which are the same, differ so much that the deviation is raised
 
 

@@ -371,8 +371,10 @@ def _reason(goodness: GoodnessOfFit, number: int, spurious: str) -> str:
 def _without_drift(
     search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit, *, is_start: bool
 ) -> tuple[RefinedPoles, GoodnessOfFit]:
-    find = _drift_beside_modes if is_start else _drift_of_all
-    drift_and_fit = None if search.drift else find(search, fit, goodness)
+    if search.drift:
+        return fit, goodness
+    beside_modes = _drift_beside_modes(search, fit, goodness) if is_start else None
+    drift_and_fit = beside_modes or find_drift(search.data, fit, search.terms)
     if drift_and_fit is None:
         return fit, goodness
     search.drift, fit_without_drift = drift_and_fit
@@ -384,19 +386,14 @@ def _without_drift(
 def _drift_beside_modes(
     search: _Search, fit: RefinedPoles, goodness: GoodnessOfFit
 ) -> tuple[Drift, RefinedPoles] | None:
-    """Find the drift, first with one pole a peak: others there may stand for it, and each costs more numbers."""
+    """Find the drift with one pole a peak, if it explains more: others there may stand for it, at more numbers each."""
     weaker = (half_widths_apart(fit.poles) < 1) & (goodness.significance > goodness.significance[:, None])
     shares_peak = weaker.any(axis=1) & ~_is_pinned(search, fit.poles)
-    if shares_peak.any():
-        one_a_peak = refine_poles(search.data, fit.poles[~shares_peak], search.terms, iterations=ROUGH_ITERATIONS)
-        found = find_drift(search.data, one_a_peak, search.terms)
-        if found is not None and found[1].misfit < fit.misfit:
-            return found
-    return _drift_of_all(search, fit, goodness)
-
-
-def _drift_of_all(search: _Search, fit: RefinedPoles, _goodness: GoodnessOfFit) -> tuple[Drift, RefinedPoles] | None:
-    return find_drift(search.data, fit, search.terms)
+    if not shares_peak.any():
+        return None
+    one_a_peak = refine_poles(search.data, fit.poles[~shares_peak], search.terms, iterations=ROUGH_ITERATIONS)
+    found = find_drift(search.data, one_a_peak, search.terms)
+    return found if found is not None and found[1].misfit < fit.misfit else None
 
 
 def _proposed_poles(search: _Search, goodness: GoodnessOfFit) -> ComplexArray:

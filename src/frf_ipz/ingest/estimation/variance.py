@@ -25,7 +25,6 @@ def frf_variance(
         Of all records.
     independent : (n_outputs,) array, optional
         How many independent ones those of each response are worth, where they overlap.
-
     force_noise : (n_outputs, n_lines) array, optional
         Noise power of the force in one record, where it was measured.
 
