@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from frf_ipz.errors import InputError, ShapeError
+from frf_ipz.errors import FileFormatError, InputError, ShapeError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from scipy import sparse
 
@@ -22,6 +23,45 @@ Matrix: TypeAlias = "sparse.csr_array[np.float64, tuple[int, int]]"  # sparse, a
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 LARGEST_WHOLE = 2**53  # above it doubles leave whole numbers out
+
+
+def as_doubles(path: Path, name: str, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Bring wider floating-point numbers of a file to double precision, whole.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for the message.
+    name : str
+        What the array is called there.
+    values : array
+        Of any kind.
+
+    Returns
+    -------
+    array
+        The same, in double precision where it was in more.
+
+    Raises
+    ------
+    FileFormatError
+        If a number is too large for double precision.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> as_doubles(Path("frf.h5"), "f", np.array([1.5], np.longdouble)).dtype.name
+    'float64'
+    """
+    doubles = {"f": np.float64, "c": np.complex128}.get(values.dtype.kind)
+    if doubles is None or values.dtype.itemsize <= np.dtype(doubles).itemsize:
+        return values
+    with np.errstate(over="ignore"):
+        taken: npt.NDArray[Any] = values.astype(doubles)
+    if not np.isfinite(taken[np.isfinite(values)]).all():
+        problem = f"'{name}' holds numbers above {np.finfo(np.float64).max:.2g}, in {values.dtype}, as no measurement"
+        raise FileFormatError(path, f"{problem} or matrix has them; is the file damaged? export it again, in doubles")
+    return taken
 
 
 def as_whole_numbers(values: npt.ArrayLike, what: str) -> IntArray:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.lib import format as npy_format
 
+from frf_ipz.arrays import as_doubles
 from frf_ipz.errors import FileFormatError
 from frf_ipz.foreign_errors import errors_of_reader
 from frf_ipz.input_files import read_bytes, require_expanded
@@ -100,4 +101,4 @@ def _array(path: Path, name: str, data: bytes) -> NDArray[Any] | None:
     if int(np.prod(shape, dtype=object)) * kind.itemsize > len(data):
         raise FileFormatError(path, f"'{name}' promises more numbers than there are: it is cut off; export it again")
     stream.seek(0)
-    return np.asarray(npy_format.read_array(stream, allow_pickle=False))
+    return as_doubles(path, name, npy_format.read_array(stream, allow_pickle=False))

@@ -26,6 +26,7 @@ from typing import IO, TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from frf_ipz.arrays import as_doubles
 from frf_ipz.errors import FileFormatError
 from frf_ipz.input_files import BLOCK_BYTES, open_input, require_expanded, require_size
 from frf_ipz.json_files import parse_json
@@ -151,7 +152,8 @@ class _Reader:
             raise FileFormatError(path, answer["problem"], where=answer["where"])
         if answer["raised"]:
             raise FileFormatError(path, f"cannot be read as {kind}: {answer['raised']}")
-        return FileContents(arrays=arrays, said=answer["said"])
+        doubles = {name: as_doubles(path, name, values) for name, values in arrays.items()}
+        return FileContents(arrays=doubles, said=answer["said"])
 
     def _started(self) -> subprocess.Popen[bytes]:
         if self._process is None or self._process.poll() is not None:

@@ -204,3 +204,42 @@ def test_a_step_that_does_not_lead_to_the_last_frequency_is_not_taken(tmp_path):
     scipy.io.savemat(tmp_path / "a.mat", {"H00": columns, "df": 1.0, "f_start": 1, "f_end": 300.0})
     with pytest.raises(InputError, match="no complex array with a vector of as many frequencies"):
         read(tmp_path / "a.mat", output="1:+z", input="1:+z")
+
+
+WIDE = {
+    "frf.npz": lambda path, frequency_hz: np.savez(path, frequency_hz=frequency_hz, frf=FRFS),
+    "frf.h5": lambda path, frequency_hz: write_data_sets(path, {"frequency_hz": frequency_hz, "frf": FRFS}),
+}
+
+
+def write_data_sets(path, arrays):
+    with h5py.File(path, "w") as file:
+        for name, values in arrays.items():
+            file[name] = values
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).max <= np.finfo(float).max, reason="long doubles are doubles here")
+@pytest.mark.parametrize("name", WIDE)
+def test_long_doubles_are_read_whole_or_refused(tmp_path, name):
+    frequency_hz = LINES_HZ.astype(np.longdouble)
+    WIDE[name](tmp_path / name, frequency_hz)
+    expect(read(tmp_path / name))
+    frequency_hz[-1] = np.longdouble("1e4000")
+    WIDE[name](tmp_path / name, frequency_hz)
+    with pytest.raises(InputError, match=f"{name}.*'/?frequency_hz' holds numbers above 1.8e.308, in float128"):
+        read(tmp_path / name)
+
+
+def test_long_doubles_in_the_fields_of_an_array(tmp_path):
+    table = np.zeros(len(LINES_HZ), [("frequency_hz", np.longdouble), ("frf", np.clongdouble)])
+    table["frequency_hz"], table["frf"] = LINES_HZ, FRFS[:, 0, 0]
+    np.save(tmp_path / "frf.npy", table)
+    frfs = read(tmp_path / "frf.npy", output="1:+z", input="1:+z")
+    np.testing.assert_allclose(frfs.values[:, 0], FRFS[:, 0, 0], rtol=1e-15)
+    assert frfs.frequency_hz.dtype == np.float64
+
+
+def test_a_coherence_of_signalling_nans_is_none(tmp_path):
+    signalling = np.full(FRFS.shape, 0x7FF0000000000001, np.uint64).view(np.float64)
+    np.savez(tmp_path / "frf.npz", f=LINES_HZ, frf=FRFS, coh=signalling)
+    assert np.isnan(read(tmp_path / "frf.npz").coherence).all()

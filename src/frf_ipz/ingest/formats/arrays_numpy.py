@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.arrays import as_doubles
 from frf_ipz.ingest.formats.file_arrays import MOST_EXPANDED, ArrayFormat, FileArrays
 from frf_ipz.numpy_files import is_numpy_file, read_numpy
 
@@ -28,7 +29,7 @@ def _read(path: Path) -> FileArrays:
         fields = {f"{name}.{part}": values[part] for part in kind.names} if kind.names else {name: values}
         for part, numbers in fields.items():
             if numbers.dtype.kind in "biufc":
-                arrays[part] = numbers
+                arrays[part] = as_doubles(path, part, numbers)
             elif numbers.dtype.kind in "US" and 0 < numbers.size <= MOST_TEXTS:
                 texts[part] = tuple(
                     str(np.char.decode(item) if item.dtype.kind == "S" else item) for item in numbers.flat

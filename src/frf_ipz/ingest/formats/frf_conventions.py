@@ -134,9 +134,9 @@ def _select(frf: MeasuredFrf, used: BoolArray, note: str) -> MeasuredFrf:
 def _check_coherence(frf: MeasuredFrf) -> MeasuredFrf:
     """Bring a coherence in per cent to 0 to 1; leave out one that is above 1."""
     coherence = frf.coherence
-    largest = 0.0 if coherence is None else float(np.nanmax(coherence, initial=0.0))
-    if coherence is None or largest <= 1.0:
+    if coherence is None or not (coherence > 1.0).any():
         return frf
+    largest = float(np.nanmax(coherence))
     name = f"{frf.source.path.name}, {frf.label}"
     if largest <= 1.0 + PRINTED:
         return replace(frf, coherence=np.minimum(coherence, 1.0))
