@@ -3,7 +3,7 @@
 ``frf-testbench study left_out FOLDER`` leaves out each sensor of the steel beam in turn, or each struck point of the
 free beam: its FRFs are kept from the fit and the update, and predicted. Errors stand in dB as predicted, and after one
 factor, the median of the ratios of all that was left out: the scale of a channel is rarely known.
-`pipelines/left_out.py` does the same with any test.
+`pipelines/left_out.py` does so with any test.
 """
 
 from __future__ import annotations
@@ -15,14 +15,17 @@ import numpy as np
 import pandas as pd
 
 import frf_ipz
+from frf_ipz.identification.noise import rough_variance
 from frf_ipz.progress import silent
 from frf_testbench.studies.recordings import require_recordings
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from frf_ipz.arrays import ComplexArray
+    from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.progress import Progress
+
+NORMAL_90 = 1.645  # standard deviations on either side that hold 90 % of a normal distribution
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +107,7 @@ def predict_left_out(beam: BeamTest, node: int) -> pd.DataFrame:
     -------
     DataFrame
         One row a model: X_S, factor, dB as predicted and after that factor, share of lines in the 90 % band of the
-        updated model and its half width, and number of targets.
+        updated model (with their own noise) and its half width, and number of targets.
     """
     at_node = [beam.dof(label).node == node for label in beam.frfs.labels]
     left_out = beam.frfs.select_frfs(np.flatnonzero(at_node).tolist())
@@ -124,12 +127,35 @@ def predict_left_out(beam: BeamTest, node: int) -> pd.DataFrame:
     }
     rows = {name: assess_agreement(left_out.values, values) for name, values in predicted.items()}
     low, high = frf_ipz.band_of_magnitudes(fit, updated, labels=labels, s=lines)
-    magnitude = np.abs(left_out.values)
     rows["updated"] |= {
-        "in the band": float(np.mean((magnitude >= low) & (magnitude <= high))),
+        "in the band": share_in_band(left_out, np.abs(predicted["updated"]), low, high),
         "band, +- dB": float(np.median(10 * np.log10(high / low))),
     }
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("model").assign(targets=len(pairs.targets))
+
+
+def share_in_band(measured: frf_ipz.FrfSet, predicted: FloatArray, low: FloatArray, high: FloatArray) -> float:
+    """Count the lines whose measured magnitude is as far from the prediction as its 90 % band and the noise allow.
+
+    A band tells where the FRF is, not where noise takes its measurement: near antiresonances that is far more.
+
+    Parameters
+    ----------
+    measured : FrfSet
+        What was left out; where its variance is not known, lines tell it by what differs from one to the next.
+    predicted, low, high : (n_lines, n_frfs) array
+        Magnitudes.
+
+    Returns
+    -------
+    float
+        0 to 1.
+    """
+    stated = measured.variance
+    variance = np.where(np.isfinite(stated), stated, rough_variance(measured.values))
+    distance = np.abs(measured.values) - predicted
+    width = np.where(distance < 0, predicted - low, high - predicted)
+    return float(np.mean(distance**2 <= width**2 + NORMAL_90**2 * variance / 2))
 
 
 def assess_agreement(measured: ComplexArray, predicted: ComplexArray) -> dict[str, float]:
