@@ -81,9 +81,40 @@ def search_neighbourhoods(
         leaders.setdefault(fit.hypothesis.components[-1].effect.name, fit)
     for leader in list(leaders.values())[:n_effects]:
         best = max(fits.values(), key=lambda fit: fit.log_evidence)
+        if best.explains_nearly_all and not leader.is_far_off:
+            leader = _step_to_rivals(problem, base, leader, best, fits, worth_fitting)
         behind = MAX_BEHIND_COMPLETE if best.explains_nearly_all else MAX_BEHIND
         if leader.log_evidence > best.log_evidence - behind and not leader.is_far_off:
             _search_neighbourhood(problem, base, leader, fits, worth_fitting)
+
+
+def _step_to_rivals(
+    problem: InferenceProblem,
+    base: Fit,
+    fit: Fit,
+    best: Fit,
+    fits: Fits,
+    worth_fitting: Callable[[Component], bool],
+) -> Fit:
+    """Step from a location that is too far behind to neighbours that need not be, seen far from the axis.
+
+    An effect has been fitted at locations apart from one another: right at one that lies between them, it may be
+    hundreds behind at each.
+    """
+    while fit.log_evidence <= best.log_evidence - MAX_BEHIND_COMPLETE:
+        component = fit.hypothesis.components[-1]
+        beside = []
+        for location in component.effect.neighbours(problem.context, component.location):
+            moved = replace(component, location=location)
+            hypothesis = problem.make_hypothesis((*base.hypothesis.components, moved))
+            is_open = moved.key not in fits and worth_fitting(moved)
+            if is_open and not is_hopeless(problem, best, hypothesis, (fit.values,)):
+                beside.append(location)
+        better = _best_of_locations(problem, base, fit, beside, fits)
+        if better is fit:
+            break
+        fit = better
+    return fit
 
 
 def _add_imitators(
