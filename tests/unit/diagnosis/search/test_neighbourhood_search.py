@@ -184,6 +184,22 @@ def test_surroundings_are_chosen_near_the_axis(nominal, monkeypatch):
     assert climb._promising_surroundings(problem, neighbour)[0].nodes == (6, 15)
 
 
+def test_a_place_between_those_that_were_fitted_is_reached_beside_one_that_explains_all(nominal, monkeypatch):
+    """A spring is hundreds behind at nodes 11 and 13 where one from node 12 to one near the clamp does the same."""
+    monkeypatch.setattr(climb, "_add_imitators", lambda *_: None)  # this place is an end of the other here
+    names = ("grounded_spring", "coupling_spring")
+    problem = problem_with(nominal, names, [("grounded_spring", 12)], [400.0])
+    places = [(names[1], 2, 12), (names[0], 11), (names[0], 13)]
+    other, *beside = (
+        problem.fit_to_convergence(problem.fit((component_at(problem, *place),), np.array([400.0]))) for place in places
+    )
+    assert other.explains_nearly_all
+    assert all(fit.log_evidence < other.log_evidence - climb.MAX_BEHIND_COMPLETE for fit in beside)
+    fits = {fit.hypothesis.components[-1].key: fit for fit in (other, *beside)}
+    climb.search_neighbourhoods(problem, fit_null_model(problem), fits)
+    assert likeliest(fits.values()).hypothesis.components[-1].key == component_at(problem, names[0], 12).key
+
+
 def test_of_several_starts_the_data_choose(nominal):
     problem = problem_with(nominal, ("grounded_spring",), [("grounded_spring", 12)], [2e3])
     hypothesis = problem.make_hypothesis((component_at(problem, "grounded_spring", 12),))
