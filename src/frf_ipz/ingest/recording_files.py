@@ -14,7 +14,7 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError, QuantityError
 from frf_ipz.ingest.formats.registry import open_recording
-from frf_ipz.ingest.formats.time_stamps import resolution_of
+from frf_ipz.ingest.formats.time_stamps import decimal_resolution, resolution_of
 from frf_ipz.ingest.signals.alignment import AGREES, Alignment, align, join
 from frf_ipz.ingest.signals.windows import noise_decays
 from frf_ipz.ingest.units import is_stated, sensitivity_factor, unit_factor, unit_ratio
@@ -32,6 +32,7 @@ Found = TypeVar("Found")
 
 BUDGET = 64_000_000  # bytes of recordings that are cached
 UNIFORM = 0.01  # of the median step: the contract's limit for a step that differs
+ROUNDED = 0.75  # of the last digit: half of it by rounding, and what that does to a straight line through few times
 FEWEST_SAMPLES = 16
 NOTHING_LEFT = -math.log(np.finfo(np.float64).eps)  # time constants after which a window is less than a double's digit
 WINDOWED_FORCE = "the applied window is taken back from the force too, as its noise decays with the window"
@@ -286,7 +287,7 @@ class UniformTimeCheck:
         can_tell = 2.0 * self._resolution < self._median  # a sample that is lost from rounding
         tolerance = UNIFORM * abs(self._median) + (self._resolution if can_tell else 0.0)
         wrong = ~(np.abs(steps - self._median) <= tolerance) | (steps <= 0.0)
-        if wrong.any():
+        if wrong.any() and not self._is_rounded(time):
             is_coarse = self._median > 0.0 and not can_tell
             coarse = f"its times are rounded to {self._resolution:.2g} s, and " if is_coarse else ""
             position = int(np.argmax(wrong))
@@ -300,6 +301,18 @@ class UniformTimeCheck:
             )
         self._n_rows += len(time)
         self._last = time[-1:]
+
+    def _is_rounded(self, time: FloatArray) -> bool:
+        """Tell whether times lie on a straight line but for the decimal digits that they are rounded to."""
+        rows = np.concatenate([self._last, time])
+        places = np.arange(len(rows)) - 0.5 * (len(rows) - 1)
+        step = float(places @ rows / max(places @ places, 1.0))
+        resolution = decimal_resolution(rows, 0.5 * step)
+        is_same = self._n_rows == 0 or abs(self._factor * step - self._median) <= UNIFORM * self._median
+        if not is_same or np.abs(rows - rows.mean() - step * places).max() > ROUNDED * resolution:
+            return False
+        self._median = self._factor * step
+        return True
 
     def finish(self) -> None:
         """Check that there were enough of them.

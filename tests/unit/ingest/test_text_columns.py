@@ -246,6 +246,35 @@ def test_a_lost_sample_is_told_from_rounding(tmp_path, kind):
     assert re.search(r"the time is not uniform: a step is 0\.0001[4-7]", message(write(tmp_path, lose)))
 
 
+def rounded(digits, rate_hz, late_s=0.0, lost=None):
+    """Write times with some significant digits, as csvwrite of MATLAB does with five; one may be late, one lost.
+
+    From 1 s on, amid the record, the same number of digits is coarser.
+    """
+
+    def make(number, fields):
+        time_s = 1.0 + (number - N_SAMPLES / 2) / rate_hz + (late_s if number == N_SAMPLES - 9 else 0.0)
+        return "" if number == lost else ",".join([f"{time_s:.{digits}g}", *fields[1:]])
+
+    def change(text):
+        return "".join(line for line in lines_with(make)(text).splitlines(keepends=True) if line.strip())
+
+    return change
+
+
+@pytest.mark.parametrize(("digits", "rate_hz"), [(5, 1024.0), (5, 2400.0), (4, 300.0), (6, 12.8e3), (5, 1000.0)])
+def test_times_with_few_significant_digits_give_their_rate(tmp_path, digits, rate_hz):
+    table = read(write(tmp_path, rounded(digits, rate_hz)))
+    last_digit = 10.0 ** (1 - digits)
+    exact = 1.0 + (np.arange(N_SAMPLES) - N_SAMPLES / 2) / rate_hz
+    np.testing.assert_allclose(table[:, 0], exact, atol=0.51 * last_digit, rtol=0)
+
+
+@pytest.mark.parametrize("fault", [{"late_s": 2e-4}, {"lost": 40}, {"lost": N_SAMPLES - 40}])
+def test_rounded_times_that_are_not_uniform_are_refused(tmp_path, fault):
+    assert "the time is not uniform" in message(write(tmp_path, rounded(5, 2048.0, **fault)))
+
+
 def test_seconds_of_a_day_are_no_days(tmp_path):
     late = lines_with(lambda number, fields: ",".join([repr(45912.5 + number / RATE_HZ), *fields[1:]]))
     table = read(write(tmp_path, late))

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
 
 DAY_S = 86400.0
+FINEST_DECIMALS = 3  # below half a step: what is rounded finer still is even within a hundredth of a step
 CENTURY_D = 36525.0
 IN_SECONDS = {"s": 1.0, "ms": 1e3, "us": 1e6, "0.1 us": 1e7, "ns": 1e9}  # counts in a second
 DAYS_TO_2000 = {  # from where it is counted
@@ -85,6 +86,42 @@ def _days_or_seconds(times: FloatArray, sample_rate_hz: float | None) -> str:
         f"its times begin at {times[0]:.10g} and may be days since a date, of {as_days_hz:.4g} samples a second, or "
         f"seconds, of {as_seconds_hz:.4g}; name the unit, as in 'time [d]', or write sample_rate_hz = ... under [test]"
     )
+
+
+def decimal_resolution(times: FloatArray, below: float) -> float:
+    """Say to which decimal digit times are rounded: those with the most digits before the point.
+
+    Parameters
+    ----------
+    times : (n,) array
+        As a file gives them.
+    below : float
+        What is not finer than this is no rounding that can be told from the times themselves.
+
+    Returns
+    -------
+    float
+        A power of ten, of which the largest times are multiples; 0 where they are not rounded so.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> decimal_resolution(np.array([0.99023, 1.0003, 1.0107]), below=0.005)
+    0.0001
+    >>> decimal_resolution(np.array([1.0, 1.0 + 1 / 3]), below=0.1)
+    0.0
+    """
+    sizes = np.abs(times)
+    largest = float(sizes.max(initial=0.0))
+    if not (0.0 < below < np.inf and 0.0 < largest < np.inf):
+        return 0.0
+    longest = sizes[sizes >= 10.0 ** np.floor(np.log10(largest))]
+    coarsest = int(np.ceil(np.log10(below))) - 1
+    for power in range(coarsest, coarsest - FINEST_DECIMALS, -1):
+        counts = longest / 10.0**power
+        if (np.abs(counts - np.rint(counts)) <= 4.0 * np.spacing(counts)).all():
+            return float(10.0**power)
+    return 0.0
 
 
 def resolution_of(times: FloatArray) -> float:
