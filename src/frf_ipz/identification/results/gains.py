@@ -165,8 +165,7 @@ def estimate_gains(fit: ModalFit, shapes: ModeSet) -> pd.DataFrame:
     poles = fit.model.poles[: fit.n_modes]
     powers = np.array([label.quantity.power for label in fit.labels])
     signs = np.array([label.sign for label in fit.labels])
-    delays = np.exp(-poles[:, None] * fit.model.delay_s)
-    receptances = fit.model.residues[: fit.n_modes] * delays / poles[:, None] ** powers
+    receptances = fit.model.residues[: fit.n_modes] / poles[:, None] ** powers
     measured = (2j * poles.imag[:, None] * receptances).real
     at_dof = dict(zip([dof.unsigned for dof in shapes.dofs], shapes.shapes.real, strict=True))
     products = np.stack(

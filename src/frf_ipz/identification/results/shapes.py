@@ -85,13 +85,13 @@ def product_factors(fit: ModalFit) -> ComplexArray:
     Returns
     -------
     (n_modes, n_frfs) complex array
-        2 i omega_d over what the quantity, the delay, the gain and the signs of the labels have put into a residue.
+        2 i omega_d over what the quantity, the gain and the signs of the labels have put into a residue.
     """
     poles = fit.model.poles[: fit.n_modes, None]
     powers = np.array([label.quantity.power for label in fit.labels])
     signs = np.array([label.sign for label in fit.labels])
-    receptance = np.exp(-poles * fit.model.delay_s) / poles**powers / fit.gain
-    return np.asarray(signs * 2j * np.maximum(poles.imag, np.finfo(float).tiny) * receptance)
+    scale = 2j * np.maximum(poles.imag, np.finfo(float).tiny)  # the residues of a model know no delay
+    return np.asarray(signs * scale / poles**powers / fit.gain)
 
 
 def _residue_matrices(
