@@ -191,6 +191,9 @@ class FrfSet(Tabulated, Drawn):
     missing_force : (n_lines, n_frfs) complex array, optional
         About what records lack of the force as they begin within its pulse, over what they hold of it: FRFs are too
         large by this part. All of it is in `variance`.
+    gain_variance : (n_lines, n_frfs) array, optional
+        The part of `variance` that stems from relative errors which change slowly with frequency, as by what records
+        lack at their beginning, or of modes at their end: the residue of a mode follows it, and the pole hardly does.
 
     Raises
     ------
@@ -228,6 +231,7 @@ class FrfSet(Tabulated, Drawn):
     correlated_lines: int = 1
     force_noise: ForceNoise | None = None
     missing_force: ComplexArray | None = None
+    gain_variance: FloatArray | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.frequency_hz), len(self.labels))
@@ -237,9 +241,11 @@ class FrfSet(Tabulated, Drawn):
         require_finite("the FRFs' values", self.values)
         if self.force_noise is not None:
             require_shape("the FRFs' force_noise", self.force_noise.relative, shape)
-        if self.missing_force is not None:
-            require_shape("the FRFs' missing_force", self.missing_force, shape)
-            object.__setattr__(self, "missing_force", read_only(self.missing_force))
+        for name in ("missing_force", "gain_variance"):
+            array = getattr(self, name)
+            if array is not None:
+                require_shape(f"the FRFs' {name}", array, shape)
+                object.__setattr__(self, name, read_only(array))
         for name in ARRAYS:
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
@@ -428,6 +434,7 @@ class FrfSet(Tabulated, Drawn):
             frequency_hz=self.frequency_hz[used],
             force_noise=None if self.force_noise is None else self.force_noise.of(used, slice(None)),
             missing_force=None if self.missing_force is None else self.missing_force[used],
+            gain_variance=None if self.gain_variance is None else self.gain_variance[used],
             **{name: getattr(self, name)[used] for name in rows},
         )
 
@@ -452,6 +459,7 @@ class FrfSet(Tabulated, Drawn):
             averages=self.averages[selected],
             force_noise=None if self.force_noise is None else self.force_noise.of(slice(None), selected),
             missing_force=None if self.missing_force is None else self.missing_force[:, selected],
+            gain_variance=None if self.gain_variance is None else self.gain_variance[:, selected],
             **{name: getattr(self, name)[:, selected] for name in columns},
         )
 

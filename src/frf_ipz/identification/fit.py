@@ -230,8 +230,8 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
     misfit = (lines.receptance - computed) * unit
     misfit_frame = misfit_table(lines.frequency_hz, misfit, np.sqrt(fitted.noise) * unit, frfs.labels)
     model = measured_model(fit.system, terms, lines.powers, order, fitted.delay_s)
-    common = _error_of_force(fitted)
-    # what an error of the force is at the poles themselves, residues have followed
+    common = _error_of_gain(fitted)
+    # what it is at the poles themselves, residues have followed
     at_modes = np.array([np.interp(natural_frequency_hz(fit.poles[modes]), lines.frequency_hz, of) for of in common.T])
     of_force = at_modes.T**2 / 2 * np.abs(model.residues[:n_modes]) ** 2
     return ModalFit(
@@ -266,12 +266,16 @@ def _beyond_noise(misfit: ComplexArray, noise_std: FloatArray) -> FloatArray:
     return np.where(size**2 > noise_std**2 * np.log(misfit.size), size, 0.0)
 
 
-def _error_of_force(fitted: FittedModes) -> FloatArray:
-    """Give the expected relative error of the force, (n_lines, n_frfs), which residues and fitted FRFs follow."""
-    if fitted.lines.force_noise is not None:
-        return np.asarray(np.abs(fitted.lines.force_noise.relative))
+def _error_of_gain(fitted: FittedModes) -> FloatArray:
+    """Give the expected relative error of the force and by slow gains, (n_lines, n_frfs): residues follow it."""
+    lines, shape = fitted.lines, fitted.lines.receptance.shape
     rms = 0.0 if fitted.force_error is None else fitted.force_error.rms_of_frfs
-    return np.asarray(rms * np.ones(fitted.lines.receptance.shape))
+    of_force = rms * np.ones(shape) if lines.force_noise is None else np.abs(lines.force_noise.relative)
+    if lines.gain_variance is None:
+        return np.asarray(of_force)
+    power = np.abs(lines.receptance) ** 2
+    slow = np.divide(lines.gain_variance, power, out=np.zeros(shape), where=power > 0.0)
+    return np.asarray(np.sqrt(of_force**2 + slow))
 
 
 def _shared_noise_factors(frfs: FrfSet, fitted: FittedModes) -> FloatArray:

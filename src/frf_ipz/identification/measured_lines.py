@@ -124,6 +124,8 @@ class MeasuredLines:
         The part of the variance that neighbouring lines share, where it is known.
     missing_force : (n_lines, n_frfs) complex array or None
         What records lack of the force, over what they hold of it, where they begin within its pulse.
+    gain_variance : (n_lines, n_frfs) array or None
+        The part of the variance by relative errors that change slowly with frequency.
     """
 
     frequency_hz: FloatArray
@@ -136,6 +138,7 @@ class MeasuredLines:
     force: IntArray
     force_noise: ForceNoise | None = None
     missing_force: ComplexArray | None = None
+    gain_variance: FloatArray | None = None
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -248,6 +251,7 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
         force=np.unique([str(label.input_dof) for label in frfs.labels], return_inverse=True)[1],
         force_noise=lines.force_noise,
         missing_force=lines.missing_force,
+        gain_variance=None if lines.gain_variance is None else lines.gain_variance / np.abs(to_receptance) ** 2,
     )
 
 

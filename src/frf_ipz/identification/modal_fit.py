@@ -13,6 +13,7 @@ from frf_ipz.errors import ShapeError
 from frf_ipz.frf import FrfLabel, FrfSet
 from frf_ipz.identification.options import Stability
 from frf_ipz.identification.root_covariance import RootCovariance, pair_blocks
+from frf_ipz.identification.window_removal import remove_window
 from frf_ipz.late_imports import import_late
 from frf_ipz.modes import ModalParameters
 from frf_ipz.rational import PoleResidueModel, ZeroSet, natural_frequency_hz
@@ -140,7 +141,7 @@ class ModalFit(Tabulated, Drawn):
 
         The windowed values are exact at s = sigma + i omega. What the fitted model changes between there and i omega is
         added to them: noise and whatever the model does not contain stay as they were measured. What is not known of
-        poles and residues counts in the variance, as if both were independent.
+        poles and residues counts in the variance, as if both were independent, and so does what the rest may change by.
 
         Parameters
         ----------
@@ -154,8 +155,8 @@ class ModalFit(Tabulated, Drawn):
         """
         if not frfs.window_decay_1_s:
             return frfs
-        is_carried = frfs.frequency_hz > 0  # at 0 Hz the model may have no value
-        s, at_window = 2j * np.pi * np.where(is_carried, frfs.frequency_hz, frfs.frequency_hz[1]), frfs.s
+        values, unmodelled = remove_window(frfs, self.model, self.n_modes, band_hz=self.band_hz)
+        s, at_window = 2j * np.pi * frfs.frequency_hz, frfs.s
         poles, residues = self.model.poles[: self.n_modes], self.model.residues[: self.n_modes]
         by_residue, by_pole = (
             np.abs((s[:, None] - poles) ** -power - (at_window[:, None] - poles) ** -power) ** 2 for power in (1, 2)
@@ -163,10 +164,11 @@ class ModalFit(Tabulated, Drawn):
         pole_variance = np.trace(pair_blocks(self.covariance)[: self.n_modes], axis1=1, axis2=2)
         added = by_pole @ (pole_variance[:, None] * np.abs(residues) ** 2)
         added += by_residue @ np.trace(self.residue_covariance, axis1=2, axis2=3)
+        is_carried = (frfs.frequency_hz > 0)[:, None]  # at 0 Hz the model may have no value
         return replace(
             frfs,
-            values=frfs.values + np.where(is_carried[:, None], self.model(s) - self.model(at_window), 0.0),
-            variance=frfs.variance + np.where(is_carried[:, None], added, 0.0),
+            values=values,
+            variance=frfs.variance + np.where(is_carried, added, 0.0) + unmodelled,
             window_decay_1_s=0.0,
         )
 

@@ -110,6 +110,22 @@ def test_residues_know_the_noise_of_the_force_at_their_modes():
     assert CALIBRATED[0] < np.sqrt(np.mean(squares)) < CALIBRATED[1]
 
 
+def test_what_records_lack_of_the_force_moves_residues_and_hardly_poles():
+    truth = fit_modes(soft_frfs(1, force_noise=1e-7, response_noise=1e-7)).model.residues[:3]
+    first, of_poles, of_residues = round(0.03 * RATE_HZ) + 2, [], []
+    for seed in range(500, 505):
+        whole = soft_impacts(seed)
+        late = [replace(one, force=one.force[first:], responses=one.responses[:, first:]) for one in whole]
+        frfs = estimate_frfs(VibrationTest.from_recordings(late)).frfs
+        fit = fit_modes(frfs, options=TO_400_HZ)
+        of_poles.append(normalised_errors(fit, SHARP))
+        errors = np.abs(fit.model.residues[:3] - truth) ** 2
+        of_residues.append(errors / np.trace(fit.residue_covariance[:3], axis1=2, axis2=3))
+    assert frfs.missing_force is not None
+    assert CALIBRATED[0] < rms(of_poles) < CALIBRATED[1]
+    assert CALIBRATED[0] < np.sqrt(np.mean(of_residues)) < CALIBRATED[1]
+
+
 def test_the_share_of_the_force_is_that_of_its_noise():
     noise = soft_frfs(1)
     line = int(np.argmin(np.abs(noise.frequency_hz - 97.0)))
@@ -130,7 +146,8 @@ def test_a_variance_that_scatters_is_split_in_proportion_to_the_measured_noise(f
     for seed in range(9, 15):
         frfs = soft_frfs(seed, force_noise=force_noise, response_noise=response_noise)
         peaks = [int(np.argmin(np.abs(frfs.frequency_hz - hz))) for hz in SHARP.frequency_hz]
-        of_force.append(np.abs(frfs.force_noise.relative * frfs.values)[peaks] ** 2 / frfs.variance[peaks])
+        by_noise = frfs.variance - frfs.gain_variance
+        of_force.append(np.abs(frfs.force_noise.relative * frfs.values)[peaks] ** 2 / by_noise[peaks])
     assert shares[0] <= np.mean(of_force) <= shares[1]
 
 
@@ -153,6 +170,7 @@ def test_poles_vary_as_samples_of_the_noise_move_them():
     noise = replace(noise, relative=1e-4 * np.exp(1j * np.angle(noise.relative)))  # so little that poles follow it
     error = modelled * noise.relative
     lines = replace(fitted.lines, receptance=modelled, variance=np.abs(error) ** 2, force_noise=noise)
+    lines = replace(lines, gain_variance=None)
     data = lines.weighted()
     fit = refine_poles(data, fitted.fit.poles, fitted.terms)
     first_s, last_s = noise.interval_s
@@ -174,7 +192,10 @@ def test_poles_vary_as_noise_under_an_exponential_window_moves_them():
     assert decay_1_s > 2.0
     modelled = response(fitted.fit.system, fitted.terms, fitted.lines.s)
     level = 1e-4 * np.abs(modelled).mean()  # so little that poles follow it
-    lines = replace(fitted.lines, receptance=modelled, variance=np.full(modelled.shape, level**2), force_noise=None)
+    variance = np.full(modelled.shape, level**2)
+    lines = replace(
+        fitted.lines, receptance=modelled, variance=variance, force_noise=None, gain_variance=None, missing_force=None
+    )
     data = lines.weighted()
     fit = refine_poles(data, fitted.fit.poles, fitted.terms)
     window = np.exp(-decay_1_s * np.arange(N_SAMPLES) / RATE_HZ)

@@ -116,6 +116,15 @@ def test_a_decay_is_cut_off_where_what_is_missing_exceeds_the_noise(tmp_path):
     assert windows[1] == 0.0
 
 
+def test_what_the_end_of_a_record_cuts_off_is_in_the_variance(tmp_path):
+    frfs = estimate(hammer_campaign(tmp_path, structure=RINGING, noise=2e-3, seed=1)).frfs
+    band = frfs.in_band(BAND_HZ)
+    over_std = np.abs(frfs.values[band] - RINGING.accelerance(frfs.s[band])) / np.sqrt(frfs.variance[band])
+    assert frfs.window_decay_1_s > 0.0
+    assert over_std.max() < 3.5
+    assert 0.7 < np.sqrt(np.mean(over_std**2)) < 1.3
+
+
 def test_an_exponential_window_does_not_magnify_what_precedes_the_pulse(tmp_path):
     rng = np.random.default_rng(2)
     for number in range(3):

@@ -7,8 +7,9 @@ whose frequencies waver moves all FRFs at once. Scores of neighbouring lines are
 
 Where the noise is known, B is known beforehand. The errors that noise of the force makes are the same few samples of
 noise on all lines: they move a sharp peak less than white noise of that size would, and what lies beside the lines that
-the force excites more. An exponential window leaves the first samples of the response's noise, so that neighbouring
-lines are alike: they move a sharp peak more.
+the force excites more. Relative errors that change slowly with frequency are the same on all lines of a peak: the
+residue follows them, and they hardly move the pole. An exponential window leaves the first samples of the response's
+noise, so that neighbouring lines are alike: they move a sharp peak more.
 
 [Huber1967] P. J. Huber, The behavior of maximum likelihood estimates under nonstandard conditions, Proc. 5th Berkeley
 Symposium on Mathematical Statistics and Probability 1, 1967, 221-233.
@@ -28,6 +29,7 @@ from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.identification.likelihood.compression import LINES_AT_ONCE, model_columns, response
 from frf_ipz.identification.measured_lines import MeasuredLines, WeightedLines
 from frf_ipz.numerics.partial_fractions import stacked
+from frf_ipz.rational import partial_fractions
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -78,12 +80,14 @@ def shared_noise_factors(
 ) -> FloatArray:
     """Find the factor on the variance of each pole by noise that lines share.
 
-    That of the force lasts as long as the force is kept; that of a response falls with its exponential window.
+    That of the force lasts as long as the force is kept; that of a response falls with its exponential window. Slow
+    relative errors are in the variance of the lines, but move poles only by what they change by within a peak, which is
+    known of what records lack of the force.
 
     Parameters
     ----------
     lines : MeasuredLines
-        Lines, their variance, and the noise of the force that is part of it.
+        Lines, their variance, and what is part of it: the noise of the force, and slow relative errors.
     fit : RefinedPoles
         The fit.
     terms : SmoothTerms
@@ -96,15 +100,18 @@ def shared_noise_factors(
     (2 n_poles,) array
         For all real parts, then all imaginary parts; 1 where each line has noise of its own.
     """
-    noise, n_poles = lines.force_noise, len(fit.poles)
-    if not n_poles or (noise is None and not windowed_s):
+    noise, slow_variance, n_poles = lines.force_noise, lines.gain_variance, len(fit.poles)
+    if not n_poles or (noise is None and slow_variance is None and not windowed_s):
         return np.ones(2 * n_poles)
     data, residues = lines.weighted(), fit.system.scaled_residues()
     error = np.zeros_like(lines.receptance) if noise is None else response(fit.system, terms, lines.s) * noise.relative
-    own = data.weight * np.sqrt(np.maximum(lines.variance - np.abs(error) ** 2, 0.0))
+    slow = 0.0 if slow_variance is None else slow_variance
+    own = data.weight * np.sqrt(np.maximum(lines.variance - slow - np.abs(error) ** 2, 0.0))
     of_response = NoiseInTime.under_window(lines.s, windowed_s) if windowed_s else _on_lines
     covariance = np.zeros((2 * n_poles, 2 * n_poles))
     of_force, shared_samples = None, dict[int, FloatArray]()
+    lacks = _lacking_at_the_beginning(lines, fit)
+    lacking: dict[int, FloatArray] = {}
     if noise is not None:
         of_force = NoiseInTime.within(lines.frequency_hz, noise.interval_s)
         error = error * np.exp(-2j * np.pi * lines.frequency_hz * np.mean(noise.interval_s))[:, None]
@@ -112,15 +119,34 @@ def shared_noise_factors(
         for frf in frfs.tolist():
             samples = of_response(slopes.scores(own[:, [frf]], residues[[frf]]))
             covariance += samples.T @ samples
+        if lacks is not None:
+            for force in np.unique(lines.force[frfs]).tolist():
+                alike = frfs[lines.force[frfs] == force]
+                change = slopes.scores(data.weight[:, alike] * lacks[:, alike], residues[alike])
+                lacking[force] = lacking.get(force, 0.0) + change.real.sum(axis=0, keepdims=True)
         if noise is None or of_force is None:
             continue
         for force in np.unique(noise.force[frfs]).tolist():
             alike = frfs[noise.force[frfs] == force]
             samples = of_force(slopes.scores(data.weight[:, alike] * error[:, alike], residues[alike]))
             shared_samples[force] = shared_samples.get(force, 0.0) + samples
-    covariance += sum(samples.T @ samples for samples in shared_samples.values())
+    covariance += sum(samples.T @ samples for samples in (*shared_samples.values(), *lacking.values()))
     inverse = np.linalg.pinv(fit.information, hermitian=True)
     return np.asarray(np.einsum("ij,jk,ki->i", inverse, covariance, inverse) / np.diag(inverse))
+
+
+def _lacking_at_the_beginning(lines: MeasuredLines, fit: RefinedPoles) -> ComplexArray | None:
+    """Give the error by what records lack of the force, (n_lines, n_frfs), all of it with one factor; None without.
+
+    The part L of the force that precedes a record leaves free motion in it. The mode R s^k / (s - p) of an FRF is off
+    by ``R p^k L(p) / (F(s) (s - p))``, and L is so short that L(p) is about L(s).
+    """
+    if lines.missing_force is None:
+        return None
+    poles, residues = fit.poles[:, None], fit.system.residues()
+    free = partial_fractions(lines.s, fit.poles) @ (residues * poles**lines.powers)
+    free += partial_fractions(lines.s, fit.poles.conj()) @ (residues * poles**lines.powers).conj()
+    return np.asarray(free / lines.s[:, None] ** lines.powers * lines.missing_force)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

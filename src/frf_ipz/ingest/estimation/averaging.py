@@ -7,7 +7,7 @@ variance; an FRF that several set-ups measured is the mean of them all.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from frf_ipz.ingest.campaign import setup_labels
 from frf_ipz.ingest.estimation.impact_noise import (
     ImpactNoise,
     add_noise,
+    gain_variance,
     impact_variance,
     relative_force_noise,
     without_force_noise,
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
     from frf_ipz.progress import Progress
 
+Column = TypeVar("Column", "FloatArray", "ComplexArray")
 SURVEY_SHARE = 0.6  # of the work
 
 
@@ -85,6 +87,7 @@ class _LabelEstimate:
     count: int
     force_noise: ComplexArray | None
     missing_force: ComplexArray | None
+    gain_variance: FloatArray | None
     force: int = 0
 
 
@@ -162,16 +165,17 @@ def _assemble_frfs(
         correlated_lines=correlated_lines(survey.decay_1_s * duration),
         unknown_scale=test.unknown_scale,
         force_noise=_force_noise(survey, ordered_estimates),
-        missing_force=_missing_force(ordered_estimates),
+        missing_force=_columns_unless_zero([estimate.missing_force for estimate in ordered_estimates]),
+        gain_variance=_columns_unless_zero([estimate.gain_variance for estimate in ordered_estimates]),
     )
 
 
-def _missing_force(estimates: Sequence[_LabelEstimate]) -> ComplexArray | None:
-    """Give what records lack of their forces, relative to what they hold; None where they lack nothing."""
-    columns = [estimate.missing_force for estimate in estimates if estimate.missing_force is not None]
-    if len(columns) < len(estimates) or not np.any(columns):
+def _columns_unless_zero(columns: Sequence[Column | None]) -> Column | None:
+    """Stack what FRFs lack; None where they lack nothing, or it is not known."""
+    known_columns = [column for column in columns if column is not None]
+    if len(known_columns) < len(columns) or not np.any(known_columns):
         return None
-    return np.column_stack(columns)
+    return np.column_stack(known_columns)
 
 
 def _force_noise(survey: Survey, estimates: Sequence[_LabelEstimate]) -> ForceNoise | None:
@@ -230,7 +234,7 @@ def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str)
     sums, noise = average.sums, average.noise
     values = estimate_frf(sums, estimator)
     coherence = estimate_coherence(sums)
-    force_noise = missing_force = None
+    force_noise = missing_force = slow_variance = None
     if noise is None:
         variance = frf_variance(sums, average.independent)
     else:
@@ -238,7 +242,8 @@ def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str)
             own_power = without_force_noise(sums, noise)
             values = estimate_frf(replace(sums, force=np.where(own_power > 0.0, own_power, sums.force)))
         variance = impact_variance(sums, noise, values)
-        force_noise = relative_force_noise(sums, noise, values, variance)
+        slow_variance = gain_variance(sums, noise, values)
+        force_noise = relative_force_noise(sums, noise, values, variance - slow_variance)
         power = sums.force.T
         missing_force = np.divide(noise.missing_force.T, power, out=np.zeros(values.shape, complex), where=power > 0.0)
     return {
@@ -249,6 +254,7 @@ def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str)
             count=int(sums.counts[column]),
             force_noise=None if force_noise is None else force_noise[:, column],
             missing_force=None if missing_force is None else missing_force[:, column],
+            gain_variance=None if slow_variance is None else slow_variance[:, column],
         )
         for column, label in enumerate(labels)
         if sums.counts[column]

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
     from frf_ipz.progress import Progress
 
+MOST_REMAINING = 0.25  # of the slowest mode: what is missing is then as large as the second half of the record
+
 
 def estimate_hammer(files: RecordingFiles, options: IngestOptions, progress: Progress) -> FrfEstimate:
     """Estimate the FRFs of a hammer test.
@@ -93,6 +95,7 @@ def _add_noise(
     noise.doubts[rows] += np.array(info.doubts)[rows, None] if info.doubts else 1.0
     noise.scaled_force[rows] += scales * weights * force**2
     noise.pulse[rows] += force * spectrum * np.exp(2j * np.pi * frequency_hz * record.trigger * record.step_s)
+    noise.cut_off[rows] += weights * force * _beyond_the_end(info, record, survey, decay)
     if any(info.missing_force):
         count = len(info.missing_force)
         lost = info.missing_force * exponential_window(count, 1.0, rate, count + record.trigger)
@@ -102,3 +105,16 @@ def _add_noise(
         sizes = np.linalg.norm(record.responses[:, first], axis=1)
         noise.missing_force[rows] += weights * missing
         noise.missing_response[rows] += weights * np.abs(missing) * sizes[:, None] / np.linalg.norm(record.force[first])
+
+
+def _beyond_the_end(info: RecordInfo, record: Record, survey: Survey, window: FloatArray) -> FloatArray:
+    """Give the modulus of what the end of an impact cuts off of the transforms of its windowed responses.
+
+    A mode that has fallen to q^2 at the end of the record has q of its first half in the second one, and q, q^2, ... of
+    that one in what would follow, so that q / (1 - q) of it is missing. q is that of the slowest mode.
+    """
+    remaining = info.remaining_amplitude * np.exp(-survey.decay_1_s * info.ringing_s)
+    q = float(np.sqrt(min(remaining, MOST_REMAINING)))
+    windowed = record.responses * window
+    windowed[:, : (record.trigger + record.n_samples) // 2] = 0.0
+    return np.asarray(np.abs(np.fft.rfft(windowed, survey.n_samples)) * q / (1.0 - q))

@@ -11,7 +11,7 @@ to the second order in the noise. Where the noise of impact k has the power v s_
 and h_k is its share of S, the scatter of n impacts has the expectation ``v sum s_k (1 - h_k)`` and the variance is
 ``v sum s_k h_k / S``. An impact whose record begins within the pulse lacks a part L of the force; its response is that
 to F + L, but for what moved before: H is wrong by about L / F, and by L / F times the ratio of response and force while
-the pulse lasts.
+the pulse lasts. What the end of a record cuts off of a mode is a part of it too, the same on all of its lines.
 
 [Bendat2010]: J. S. Bendat, A. G. Piersol, Random Data, 4th ed., Wiley 2010 (doi:10.1002/9781118032428), section 6.1,
 for the bias of H1.
@@ -61,6 +61,8 @@ class ImpactNoise:
         What the record lacks of the force, times the conjugate of what it holds.
     missing_response : (n_outputs, n_lines) array
         The same of the response, as moduli.
+    cut_off : (n_outputs, n_lines) array
+        What would follow the end of the response, times the modulus of the force, as moduli.
     pulse : (n_outputs, n_lines) complex array
         Transform of the force from its impact on, times its modulus.
     """
@@ -72,6 +74,7 @@ class ImpactNoise:
     doubts: FloatArray
     missing_force: ComplexArray
     missing_response: FloatArray
+    cut_off: FloatArray
     pulse: ComplexArray
 
     def take(self, rows: Sequence[int]) -> ImpactNoise:
@@ -179,11 +182,33 @@ def impact_variance(sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray
         unexplained = np.where(sums.counts == 1, measured, scatter)
         unexplained += gain * (noise.force.T / counts) * (noise.force.T / power)
         variance = unexplained * power / own_power**2
-        variance += gain * np.abs(noise.missing_force / sums.force).T ** 2
-        variance += (noise.missing_response / sums.force).T ** 2
+        variance += gain_variance(sums, noise, values)
         is_recorded = MOST_MISSING * power >= np.abs(noise.missing_force).T
         is_recorded &= (noise.force.T > 0.0) | (power > LEAST_FORCE * power.max(axis=0))
     return np.asarray(np.where((own_power > 0.0) & _up_to_first_hole(is_recorded), variance, np.nan))
+
+
+def gain_variance(sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray) -> FloatArray:
+    """Give the part of the variance that stems from what records lack of force and responses.
+
+    Parameters
+    ----------
+    sums : SpectrumSums
+        Of the impacts.
+    noise : ImpactNoise
+        Theirs.
+    values : (n_lines, n_outputs) complex array
+        The FRFs.
+
+    Returns
+    -------
+    (n_lines, n_outputs) array
+        Square of an error that is much the same on the lines of a mode, relative to it; 0 where there is no force.
+    """
+    square = np.abs(values) ** 2 * np.abs(noise.missing_force.T) ** 2
+    square += noise.missing_response.T**2 + noise.cut_off.T**2
+    power = sums.force.T
+    return np.asarray(np.divide(square, power**2, out=np.zeros_like(square), where=power > 0.0))
 
 
 def relative_force_noise(
@@ -204,7 +229,7 @@ def relative_force_noise(
     values : (n_lines, n_outputs) complex array
         The FRFs.
     variance : (n_lines, n_outputs) array
-        Of the FRFs.
+        Of the FRFs, by noise.
 
     Returns
     -------
