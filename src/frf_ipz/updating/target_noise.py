@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cholesky, lapack, solve_triangular
 from scipy.sparse.csgraph import connected_components
 
 from frf_ipz.arrays import FloatArray, IntArray
@@ -96,28 +96,29 @@ class TargetNoise:
             yield np.arange(first, first + len(block)), block
             first += len(block)
 
-    def square(self, error: FloatArray) -> float:
-        """Weigh an error by the inverse of the covariance, which has to be positive definite.
+    def squares(self, errors: FloatArray) -> FloatArray:
+        """Weigh errors by the inverse of the covariance, which has to be positive definite.
 
         Parameters
         ----------
-        error : (n,) array
-            Of the data.
+        errors : (n, m) array
+            Of the data, one a column.
 
         Returns
         -------
-        float
-            ``e^T R^-1 e``.
+        (m,) array
+            ``e^T R^-1 e`` of each.
         """
-        own, shared = 0.0, np.zeros(self.common.shape[1])
+        count = errors.shape[1]
+        own, shared = np.zeros(count), np.zeros((self.common.shape[1], count))
         information = np.eye(len(shared))
         for part, block in self.parts():
-            both = np.column_stack([error[part], self.common[part]])
-            white = solve_triangular(cholesky(block, lower=True), both, lower=True)
-            own += float(white[:, 0] @ white[:, 0])
-            shared += white[:, 1:].T @ white[:, 0]
-            information += white[:, 1:].T @ white[:, 1:]
-        return own - float(shared @ np.linalg.solve(information, shared))
+            both = np.hstack([errors[part], self.common[part]])
+            white, _ = lapack.dtrtrs(np.linalg.cholesky(block), both, lower=1)
+            own += np.sum(white[:, :count] ** 2, axis=0)
+            shared += white[:, count:].T @ white[:, :count]
+            information += white[:, count:].T @ white[:, count:]
+        return np.asarray(own - np.sum(shared * np.linalg.solve(information, shared), axis=0))
 
     def draw(self, white: FloatArray) -> FloatArray:
         """Give errors with this covariance: its lower Cholesky factor times white ones.

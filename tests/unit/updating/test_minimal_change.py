@@ -22,7 +22,7 @@ from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.parameters import ParameterBasis, PriorTerm, make_structural_basis
 from frf_ipz.updating.problem import make_problem
 from frf_ipz.updating.regions import reduced_regions
-from frf_ipz.updating.tracking import _over
+from frf_ipz.updating.tracking import _over, nearest_roots
 from frf_ipz.updating.update import update_model
 from frf_ipz.updating.updated_model import UpdateStatus
 from frf_testbench.updating.random_structures import draw_structure, scale_stiffness
@@ -30,6 +30,8 @@ from frf_testbench.updating.study import make_update_case
 from frf_testbench.updating.synthetic_fit import TrueModes, choose_band, list_labels, simulate_fit
 
 SEEDS = (3, 7, 11, 21)  # structures with one to four FRFs, one of them free to fly
+OF_NOTHING = 1e-4  # of the damping: of a real part of five times its size 2e-2 came through
+FOLLOWED = 1e-6  # relative: of a zero that is the same
 WITHIN_NOISE = 4.0  # standard deviations: hardly one of a hundred targets lies beyond
 
 
@@ -140,6 +142,37 @@ def test_a_target_that_all_others_contradict_is_excluded_and_reported():
     assert f"{abs(rows[index].measured_value) / 2 / np.pi:.6g} Hz" in updated.unmet[0]
     honest = update_model(case.fit, case.reduced_model, pairs=case.pairs, basis=basis)
     assert not honest.unmet
+
+
+def test_a_zero_that_shapes_leave_off_tells_nothing_of_damping():
+    """Its real part is as far off as its modulus is."""
+    case = make_update_case(5)
+    basis = make_structural_basis(case.structure.nominal_model, case.reduced_model)
+    rows = list(case.pairs.rows)
+    index = next(k for k, row in enumerate(rows) if row in case.pairs.targets and row.kind == "zero")
+    value = 1.25 * rows[index].measured_value
+    dampings = []
+    for wrong in (value, complex(5 * value.real, value.imag)):
+        rows[index] = replace(rows[index], measured_value=wrong)
+        updated = update_model(case.fit, case.reduced_model, pairs=replace(case.pairs, rows=tuple(rows)), basis=basis)
+        dampings.append(updated.model.damping)
+    assert_allclose(dampings[1], dampings[0], rtol=0, atol=OF_NOTHING * np.abs(dampings[0]).max())
+
+
+def test_values_are_followed_to_the_stiffness_that_was_found_last(monkeypatch):
+    """After damping came another stiffness: zeros of hundreds of FRFs would all have to be searched for."""
+    found = []
+
+    def spy(targets, reference, *model):
+        found.append((reference, nearest_roots(targets, reference, *model)))
+        return found[-1][1]
+
+    monkeypatch.setattr("frf_ipz.updating.problem.nearest_roots", spy)
+    case = make_update_case(5)
+    updated = update_model(case.fit, case.reduced_model, pairs=case.pairs)
+    assert "stiffness with damping" in set(updated.history.phase)
+    followed, values = found[-1]
+    assert_allclose(followed, values, rtol=FOLLOWED)
 
 
 def test_noisier_targets_are_met_less():

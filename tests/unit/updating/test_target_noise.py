@@ -26,13 +26,13 @@ def whole(noise):
 
 def test_an_error_is_weighed_by_the_inverse_of_the_covariance(noise):
     error = np.random.default_rng(1).standard_normal(6)
-    assert_allclose(noise.square(error), error @ np.linalg.solve(whole(noise), error), rtol=1e-9)
+    assert_allclose(noise.squares(error[:, None])[0], error @ np.linalg.solve(whole(noise), error), rtol=1e-9)
 
 
 def test_it_is_weighed_so_without_common_errors_too(noise):
     alone = TargetNoise(common=np.zeros((6, 0)), blocks=noise.blocks, places=noise.places)
     error = np.random.default_rng(1).standard_normal(6)
-    assert_allclose(alone.square(error), error @ np.linalg.solve(whole(alone), error), rtol=1e-9)
+    assert_allclose(alone.squares(error[:, None])[0], error @ np.linalg.solve(whole(alone), error), rtol=1e-9)
 
 
 def test_drawn_errors_have_the_covariance(noise):

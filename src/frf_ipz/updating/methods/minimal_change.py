@@ -109,8 +109,7 @@ class _Update:
 
     @cached_property
     def values(self) -> ComplexArray:
-        tracked = self.posterior.damping_result.tracked.values(len(self.problem.values))
-        return self.problem.nearest_roots(self.model, tracked)
+        return self.problem.nearest_roots(self.model, self.posterior.values(len(self.problem.values)))
 
 
 def _solve_with_masses(
@@ -250,6 +249,8 @@ def _damping_phase(
 ) -> DampingPhase:
     rows = phase.target_roots.rows.items()
     real_part = np.tile([-1.0, 0.0], (len(problem.values), 1))
+    # what shapes leave of a modulus they leave of the real part: an error of a complex number has no direction
+    of_shapes = result.error**2
     return damping_phase(
         phase.basis,
         inner,
@@ -259,7 +260,7 @@ def _damping_phase(
         inner.to_modal(frame.to_modal(problem.model.damping) + _damping_by_stiffness(phase, result.theta)),
         _dashpots(problem, frame, inner),
         problem.values,
-        project(problem.covariance, real_part).plus(of_damping * np.abs(problem.values) ** 2),
+        project(problem.covariance, real_part).plus((of_damping + of_shapes) * np.abs(problem.values) ** 2),
         1j * np.sqrt(result.tracked.values(len(problem.values))),
     )
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.pencils import modes_of_stack
 from frf_ipz.updating.gaussian import draw_posterior
@@ -16,6 +16,7 @@ from frf_ipz.updating.minimal_change.gauss_newton import Phase, PhaseResult
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, is_negative
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase
 from frf_ipz.updating.parameters import unwhiten
+from frf_ipz.updating.tracking import with_damping
 
 if TYPE_CHECKING:
     from scipy.optimize import linear_sum_assignment
@@ -57,6 +58,24 @@ class Posterior:
         mass, stiffness = self.stiffness.matrices(self.stiffness_result.theta)
         damping = self.inner.from_modal(self.damping.damping(self.damping_result.theta))
         return self.frame.from_modal(mass), self.frame.from_modal(damping), self.frame.from_modal(stiffness)
+
+    def values(self, count: int) -> ComplexArray:
+        """Roots of the updated model, followed from the stiffness that was found last: damping came before it.
+
+        Parameters
+        ----------
+        count : int
+            Number of targets.
+
+        Returns
+        -------
+        (count,) complex array
+            rad/s.
+        """
+        phase, result = self.stiffness, self.stiffness_result
+        damping = self.inner.from_modal(self.damping.damping(self.damping_result.theta))
+        mass, stiffness = phase.matrices(result.theta)
+        return with_damping(phase.target_roots, result.tracked, mass, damping, stiffness).values(count)
 
 
 def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:

@@ -236,14 +236,16 @@ def iterate(
         state, fraction = _line_search(phase, scales, before, step.mean, linear)
         predicted = before.error + fraction * (data - _explained(linear, scales[:-1], step.mean) - before.error)
         deviation = np.abs(state.error - predicted)
-        gain = _cost(best, noise) - _cost(state, noise)
+        # change and misfit together, without the noise that stands for curvature
+        best_square, square = noise.squares(np.stack([best.error, state.error], axis=1))
+        gain = float(best.whitened @ best.whitened + best_square - state.whitened @ state.whitened - square)
         is_nearer = gain > 0
         best = state if is_nearer else best
         if fraction:
             nonlinearity = np.maximum(CURVATURE * deviation, 0.0 if is_nearer else nonlinearity)
         else:
             nonlinearity = STALLED * np.maximum(nonlinearity, np.sqrt(noise.variance))
-        row = _history_row(terms, iteration, state.error, noise, step, scales, fraction)
+        row = _history_row(terms, iteration, state.error, float(square), step, scales, fraction)
         rows.append(row | phase.history_columns(state.theta))
         distance = distance_to_optimum(linear, step, scales[:-1], float(scales[-1]), state.whitened, state.error)
         is_nearing = rows[-1]["misfit"] > len(data) and gain > CONVERGED**2  # what stands for curvature hides errors
@@ -263,11 +265,6 @@ def iterate(
         rows=tuple(rows),
         converged=converged,
     )
-
-
-def _cost(state: _Iterate, noise: TargetNoise) -> float:
-    """Weigh change and misfit together, without the noise that stands for curvature."""
-    return float(state.whitened @ state.whitened) + noise.square(state.error)
 
 
 def _explained(linear: Linearised, scales: FloatArray, mean: FloatArray) -> FloatArray:
@@ -311,14 +308,14 @@ def _history_row(
     terms: tuple[PriorTerm, ...],
     iteration: int,
     error: FloatArray,
-    noise: TargetNoise,
+    misfit: float,
     step: GaussianStep,
     scales: FloatArray,
     fraction: float,
 ) -> dict[str, float]:
     return {
         "iteration": iteration,
-        "misfit": noise.square(error),
+        "misfit": misfit,
         "step": fraction,
         "largest_error": float(np.abs(error).max(initial=0.0)),
         "size_of_change": float(np.linalg.norm(step.mean)),
