@@ -12,8 +12,10 @@ from frf_ipz.diagnosis.measured.group_spectra import group_records
 from frf_ipz.diagnosis.measured.preprocessing.dc_offset import remove_dc_offset
 from frf_ipz.diagnosis.measured.preprocessing.residual_motion import (
     LARGEST_OFFSET,
+    LEAST_NOISE,
     WINDOW_DECAYS,
     _gate_from_start,
+    _misfit,
     _prepare_group,
     remove_residual_motion,
 )
@@ -240,6 +242,23 @@ def first_group(observations):
     pulses = {record.name: isolate_pulse(record) for record in observations.records}
     decay = WINDOW_DECAYS / observations.records[0].duration_s
     return _prepare_group(group_records(observations)[0], pulses, observations, decay)
+
+
+@pytest.mark.parametrize("noise_part", [1e-7, 1e-5, 1e-3])
+def test_noise_that_errors_of_a_model_may_be_is_known_all_the_same(strike, noise_part):
+    """A trace of noise would make the samples before an impact exact, and their offset."""
+    std, rng = noise_part * float(largest(strike()).max()), np.random.default_rng(11)
+    noisy = replace(
+        strike(),
+        records=tuple(
+            replace(record, responses=record.responses + std * rng.standard_normal(record.responses.shape))
+            for record in strike().records
+        ),
+    )
+    group = first_group(noisy)
+    nothing = [np.zeros(group.n_terms(record)) for record in group.records]
+    noise = _misfit(group, 0, nothing, LEAST_NOISE * std).noise
+    assert noise.white > 0.1 * std**2 * group.records[0].step_s
 
 
 def without_its_second_sensor(record):

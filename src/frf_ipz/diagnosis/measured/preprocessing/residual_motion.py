@@ -383,11 +383,13 @@ def _misfit(group: _Group, row: int, amplitudes: list[FloatArray], least_noise: 
     energy = _unexplained_energy(force, rest) + least_noise**2 / per_square
     of_model = (MODEL_ERROR * np.abs(rest)) ** 2
     gain = np.full(len(energy), 0.5 / group.lines.s.real[0])
+    noise = fit_noise(group.lines.frequency_hz[::FINER], energy, gain, np.mean(of_model, axis=1))
+    quietest = float(np.min(energy / gain))  # where errors of the model may be all of a misfit, noise may be as well
     return _Misfit(
         units=units,
         variance=energy[:, None] + of_model,
         std=float(np.sqrt(np.median(energy) * per_square)),
-        noise=fit_noise(group.lines.frequency_hz[::FINER], energy, gain, np.mean(of_model, axis=1)),
+        noise=replace(noise, white=max(noise.white, quietest)),
         n_records=len(group.records),
     )
 
