@@ -318,6 +318,23 @@ def test_impacts_that_are_two_groups_are_named_and_their_deviations_take_either_
         assert 0.5 < errors < 1.3  # 1.4 to 2.6 by the scatter
 
 
+def test_several_impacts_that_contradict_the_others_alike_are_a_group_and_no_majority_decides():
+    """Where four of seven were struck beside the point, the other three are right."""
+    for wrong in ((0, 1, 3, 5), (2, 6)):
+        result, errors = struck_beside([0.3 * (number in wrong) for number in range(7)], seed=3)
+        assert result.records.used.all()
+        assert not any("left out" in text for text in result.warnings)
+        assert any("two groups" in text for text in result.warnings)
+        assert 0.4 < errors < 1.7  # 600 with four
+
+
+def test_impacts_that_contradict_the_others_each_by_itself_are_left_out():
+    result, errors = struck_beside([0.3, 0.0, 0.0, -0.5, 0.0, 0.0, 0.0], seed=3)
+    assert result.records.used.tolist() == [False, True, True, False, True, True, True]
+    assert not any("two groups" in text for text in result.warnings)
+    assert 0.7 < errors < 1.3
+
+
 def test_impacts_that_scatter_about_their_point_are_no_groups():
     for seed in range(4):
         offsets = 0.05 * np.random.default_rng(seed).standard_normal(7)

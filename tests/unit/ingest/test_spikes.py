@@ -66,3 +66,26 @@ def test_sound_responses_have_no_spikes(noise, step):
 def test_real_impacts_have_no_spikes(recordings):
     test = frf_ipz.read_test(recordings / "raw_hammer" / "test.toml")
     assert not frf_ipz.estimate_frfs(test).records.marks.str.contains("jumps").any()
+
+
+def crackling(seed, decay_s=0.05, n_jumps=8):
+    """Estimate FRFs of five impacts; from the second on the first channel jumps often, and each jump decays slowly."""
+    rng, impacts = np.random.default_rng(seed), []
+    for number, height in enumerate(HEIGHTS):
+        signals = impact(STRUCTURE, height=height, noise=NOISE, rng=rng)
+        for at in rng.integers(300, 3900, n_jumps if number else 0):
+            signals[1, at:] += 10.0 * rng.standard_normal() * np.exp(-np.arange(signals.shape[1] - at) / 2048 / decay_s)
+        impacts.append(signals)
+    return frf_ipz.estimate_frfs(in_memory(impacts))
+
+
+def test_jumps_that_decay_are_taken_off_whole_and_the_channel_is_named():
+    result = crackling(1)
+    over_std, median = relative_errors(result.frfs)
+    _, sound = relative_errors(crackling(1, n_jumps=0).frfs)
+    assert median < 2.0 * sound  # 40 times as large where their beginnings alone are taken off
+    assert 0.7 < over_std < 1.5
+    (text,) = [text for text in result.warnings if "jumps" in text]
+    assert text.startswith("1:+z jumps ")
+    assert "in 4 of 5 records at 7:+z" in text
+    assert "taken off" in text

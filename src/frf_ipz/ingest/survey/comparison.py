@@ -26,7 +26,7 @@ from frf_ipz.ingest.survey.contradictions import (
 from frf_ipz.quantities import RESPONSES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence, Set
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.ingest.recording_files import RecordingFiles
@@ -161,6 +161,11 @@ def _compare_setup(
                     unlike.add((impact, output))
                 named[output] = f"{CONTRADICTS}: {explained or _difference(spectra, comparison, (impact, output))}"
     agree = [() if comparison is None else comparison.agreeing for comparison in comparisons]
+    for output, second in _second_groups(spectra, agree, unlike).items():
+        agree[output] = tuple(sorted((*agree[output], *second)))
+        for impact in second:
+            del causes[impact][output]
+            unlike.remove((impact, output))
     found = {
         impacts: find_two_groups(spectra, [output for output, same in enumerate(agree) if same == impacts], impacts)
         for impacts in dict.fromkeys(agree)
@@ -176,6 +181,34 @@ def _compare_setup(
         for impact, record in enumerate(_weighed(files, survey, records, spectra, agree))
     ]
     return compared, _say_groups(columns, records, groups)
+
+
+def _second_groups(
+    spectra: ImpactSpectra, agree: Sequence[Sequence[int]], unlike: Set[tuple[int, int]]
+) -> dict[int, tuple[int, ...]]:
+    """Find the impacts that contradict the majority, but agree with each other: which group is right does not show.
+
+    Parameters
+    ----------
+    spectra : ImpactSpectra
+        All impacts.
+    agree : sequence of sequences of int
+        The majority in each response.
+    unlike : set of pairs of int
+        Impacts and responses that contradict it as nothing explains.
+
+    Returns
+    -------
+    dict of int to tuple of int
+        The second group, where there is one, by the response.
+    """
+    seconds = {}
+    for output, majority in enumerate(agree):
+        second = tuple(sorted(impact for impact, of in unlike if of == output))
+        groups = find_two_groups(spectra, [output], sorted((*majority, *second))) if len(second) > 1 else None
+        if groups is not None and second in (groups.first, groups.second):
+            seconds[output] = second
+    return seconds
 
 
 def _say_groups(columns: Sequence[str], records: Sequence[RecordInfo], groups: Sequence[TwoGroups | None]) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.ingest.signals.clipping import find_saturated_peaks
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -156,7 +157,7 @@ def select_records(records: Sequence[RecordInfo], options: IngestOptions) -> Sel
         else record
         for record in decided_records
     ]
-    warnings += _warn_of_channels(decided_records)
+    warnings += [*_warn_of_channels(decided_records), *_warn_of_jumps(decided_records)]
     return Selection(records=tuple(decided_records), step_s=step_s, warnings=tuple(warnings))
 
 
@@ -178,6 +179,28 @@ def _warn_of_channels(records: Sequence[RecordInfo]) -> list[str]:
                     for at, text in record.channel_faults
                     if at == output
                 ]
+    return warnings
+
+
+def _warn_of_jumps(records: Sequence[RecordInfo]) -> list[str]:
+    """Say which channels jump as no structure moves, in how many of the impacts at a point."""
+    warnings = []
+    for setup in dict.fromkeys(record.setup for record in records):
+        used_records = [record for record in records if record.used and record.setup == setup]
+        for output, dof in enumerate(setup.output_dofs):
+            counts = [
+                sum(spike.output == output for spike in record.spikes)
+                for record in used_records
+                if output in record.used_outputs
+            ]
+            jumping = [count for count in counts if count]
+            if jumping:
+                times = "once" if sum(jumping) == 1 else f"{sum(jumping)} times"
+                records_at = f"{len(jumping)} of {counted(len(counts), 'record')} at {setup.input_dof}"
+                warnings.append(
+                    f"{dof} jumps {times}, in {records_at}, as no structure moves (a loose cable?): the jumps are "
+                    "taken off, and what is not known of them counts as noise"
+                )
     return warnings
 
 
