@@ -3,7 +3,9 @@
 An update moves poles and zeros to those that were measured. Where some are paired wrongly (many light local modes in
 few sensors), the FRFs in between move away from the measurement. So the median deviation of the measured FRFs, in dB,
 is compared before and after; the noise of the fitted FRFs is what it may grow by without meaning anything. A factor
-that all FRFs share is taken off: a level that is wrong, of units or of the mass, is no work of the update.
+that all FRFs share is taken off: a level that is wrong, of units or of the mass, is no work of the update. It is the
+same one before and after, so where a test knows its scale, the one of both that is nearer to 1 is taken off: an update
+that changes the level of FRFs that were right has bent shapes.
 """
 
 from __future__ import annotations
@@ -48,9 +50,17 @@ def keep_if_better(updated: UpdatedModel, fit: ModalFit) -> UpdatedModel:
     """
     if not fit.labels or updated.model is updated.nominal or not len(updated.after):
         return updated
-    before_db, after_db = (
-        median_deviation_db(fit, model, np.abs(scale.gains(fit.labels)))
+    before, after = (
+        _off_db(fit, model, np.abs(scale.gains(fit.labels)))
         for model, scale in ((updated.nominal, updated.nominal_scale), (updated.model, updated.scale))
+    )
+    if not before.size:
+        return updated
+    levels = [float(np.median(before)), float(np.median(after))]
+    if fit.unknown_scale == "none":
+        levels = [min(levels, key=abs)] * 2
+    before_db, after_db = (
+        float(np.median(np.abs(off - level))) for off, level in zip((before, after), levels, strict=True)
     )
     if not after_db > before_db + _noise_db(fit):
         return updated
@@ -88,12 +98,15 @@ def median_deviation_db(fit: ModalFit, model: ReducedModel, gains: FloatArray | 
     float
         Median over all lines above their noise, beside one factor that all FRFs share, dB; 0 where there is none.
     """
+    off_db = _off_db(fit, model, gains)
+    return float(np.median(np.abs(off_db - np.median(off_db)))) if off_db.size else 0.0
+
+
+def _off_db(fit: ModalFit, model: ReducedModel, gains: FloatArray | None) -> FloatArray:
+    """Model over measured FRFs, dB, on the lines above their noise."""
     s, measured, is_heard = _heard(fit)
-    if not is_heard.any():
-        return 0.0
     values = np.abs(compute_frfs(model, fit.labels, s) * (1.0 if gains is None else gains))[is_heard]
-    off_db = DB * np.log(np.maximum(values, np.finfo(float).tiny) / measured[is_heard])
-    return float(np.median(np.abs(off_db - np.median(off_db))))
+    return np.asarray(DB * np.log(np.maximum(values, np.finfo(float).tiny) / measured[is_heard]))
 
 
 def _heard(fit: ModalFit) -> tuple[ComplexArray, FloatArray, BoolArray]:

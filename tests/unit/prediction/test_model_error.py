@@ -66,7 +66,7 @@ def lacking():
 def test_a_model_that_can_express_the_measurement_keeps_a_narrow_band(sound):
     prediction, by_ensemble, truth = sound
     assert share_inside(prediction, truth) > 0.75
-    assert half_width_db(prediction) < 0.05
+    assert half_width_db(prediction) < 0.12  # masses leave 0.7 % of an amplitude open at each point: 0.1 dB
     assert half_width_db(prediction) < 1.2 * half_width_db(by_ensemble)
 
 
