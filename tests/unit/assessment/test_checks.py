@@ -282,7 +282,7 @@ def test_a_mass_that_is_in_doubt_is_said(evidence, factor, called):
     assert f"either the model is {called} than the machine (90 %: " in check.says
 
 
-def test_a_model_that_is_too_heavy_is_said_by_frequencies_and_amplitudes(evidence):
+def test_a_model_that_is_too_heavy_is_said_by_frequencies_and_amplitudes():
     """6 % is within what masses of models may be off, but two measurements agree on it."""
     run = run_of(frf_ipz.make_beam(**{**BEAM, "density_kg_m3": BEAM["density_kg_m3"] / 1.06}))
     check = the(quality.level, run)

@@ -156,7 +156,9 @@ def test_masses_at_points_that_were_not_measured_are_open_and_those_at_measured_
     none = np.zeros((0, 3, *common.updated.model.mass.shape))
     scale = fit_scale(known, common.pairs, common.updated.model, common.updated.after, none)
     errors = np.log(scale.drawn_about_level(elsewhere, 200))
-    shares = 1 + 1 / N_OUTPUTS + (1 - 1 / N_INPUTS)  # of the point, of the mean sensor, of the input beside the mean one
+    shares = (
+        1 + 1 / N_OUTPUTS + (1 - 1 / N_INPUTS)
+    )  # of the point, of the mean sensor, of the input beside the mean one
     assert np.std(errors) == pytest.approx(LOCAL_MASS_STD / 2 * np.sqrt(shares), rel=0.25)
     sure = fit_scale(known, common.pairs, common.updated.model, common.updated.after, none, local_std=0.0)
     assert np.std(np.log(sure.drawn_about_level(elsewhere, 200))) < LOCAL_MASS_STD / 4

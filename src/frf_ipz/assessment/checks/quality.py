@@ -16,7 +16,6 @@ from frf_ipz.updating.parameters import MASS_STD
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.assessment.evidence import Evidence
-    from frf_ipz.updating.scale import MeasuredScale
 
 WORST_MISFIT = 10.0  # times the noise: stated deviations of poles and zeros then mean nothing
 NO_CHANCE = 3.0  # standard deviations: once in 370 runs
@@ -230,7 +229,9 @@ def level(evidence: Evidence) -> Iterator[Check]:
     higher = f"{abs(100 * float(np.expm1(log_factor / 2))):.2g} % {'higher' if log_factor > 0 else 'lower'}"
     what = f"either {model} {interval} in these modes, or {test}"
     if is_told:
-        what = f"{model} {interval}, as frequencies tell too, which are all {higher}; else its stiffness is off and {test}"
+        what = (
+            f"{model} {interval}, as frequencies tell too, which are all {higher}; else its stiffness is off and {test}"
+        )
     yield Check(
         name="mass of the model",
         verdict=Verdict.WITH_CARE,
