@@ -8,7 +8,7 @@ proportion to the mean amplitude of the FRF, whose size follows from the scatter
 
 Where the scale is known, the gain common to all FRFs is fitted all the same: it shows by how much the mass of the model
 is in doubt, which poles and zeros do not tell. The model stays as it is (a slip in the units of the test looks alike).
-As many members of the ensemble as `mass_or_test` finds probable take the gain that was found for that of the structure:
+As many members of the ensemble as `mass_evidence` finds probable take the gain that was found for that of the structure:
 bands reach from the model to it, and hold the truth either way.
 
 Masses differ along a structure too, which poles and zeros hardly tell beside stiffness. The squares of the amplitudes
@@ -35,7 +35,7 @@ from frf_ipz.frf import FrfLabel
 from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.pencils import modes_of_stack
 from frf_ipz.pairing.poles import AMPLITUDE_STD, measured_amplitudes
-from frf_ipz.updating.mass_or_test import probability_of_mass
+from frf_ipz.updating.mass_evidence import probability_of_mass
 from frf_ipz.updating.parameters import LOCAL_MASS_STD
 from frf_ipz.visible_text import counted
 

@@ -23,7 +23,7 @@ from frf_ipz.progress import silent
 from frf_ipz.structure import ReducedModel, StructuralModel
 from frf_ipz.updating import methods
 from frf_ipz.updating.fall_back import keep_if_better
-from frf_ipz.updating.mass_or_test import frequency_factor
+from frf_ipz.updating.mass_evidence import frequency_factor
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.pairing_again import PairingAgain
 from frf_ipz.updating.parameters import ParameterBasis, make_structural_basis

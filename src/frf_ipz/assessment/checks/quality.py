@@ -10,7 +10,7 @@ import numpy as np
 from frf_ipz.assessment.assessment import Check, Verdict
 from frf_ipz.assessment.checks.agreement import NORMAL_90
 from frf_ipz.control_margins import GAIN_MARGIN_DB, SIXTH
-from frf_ipz.updating.mass_or_test import frequency_factor
+from frf_ipz.updating.mass_evidence import frequency_factor
 from frf_ipz.updating.parameters import MASS_STD
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from frf_ipz.updating.mass_or_test import frequency_factor, probability_of_mass
+from frf_ipz.updating.mass_evidence import frequency_factor, probability_of_mass
 
 ROOTS = np.array([100j, 150j, 420j, 900j])
 
