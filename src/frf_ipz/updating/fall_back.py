@@ -4,8 +4,8 @@ An update moves poles and zeros to those that were measured. Where some are pair
 few sensors), the FRFs in between move away from the measurement. So the median deviation of the measured FRFs, in dB,
 is compared before and after; the noise of the fitted FRFs is what it may grow by without meaning anything. A factor
 that all FRFs share is taken off: a level that is wrong, of units or of the mass, is no work of the update. It is the
-same one before and after, so where a test knows its scale, the one of both that is nearer to 1 is taken off: an update
-that changes the level of FRFs that were right has bent shapes.
+same one before and after, so what amplitudes of modes differ by in level between the two is left on the one that is
+farther from the test's: an update that changes the level of FRFs that were right has bent shapes.
 """
 
 from __future__ import annotations
@@ -50,17 +50,13 @@ def keep_if_better(updated: UpdatedModel, fit: ModalFit) -> UpdatedModel:
     """
     if not fit.labels or updated.model is updated.nominal or not len(updated.after):
         return updated
-    before, after = (
-        _off_db(fit, model, np.abs(scale.gains(fit.labels)))
-        for model, scale in ((updated.nominal, updated.nominal_scale), (updated.model, updated.scale))
-    )
-    if not before.size:
-        return updated
-    levels = [float(np.median(before)), float(np.median(after))]
-    if fit.unknown_scale == "none":
-        levels = [min(levels, key=abs)] * 2
     before_db, after_db = (
-        float(np.median(np.abs(off - level))) for off, level in zip((before, after), levels, strict=True)
+        median_deviation_db(fit, model, np.abs(scale.gains(fit.labels)), level_db=level_db)
+        for (model, scale), level_db in zip(
+            ((updated.nominal, updated.nominal_scale), (updated.model, updated.scale)),
+            _changed_db(updated),
+            strict=True,
+        )
     )
     if not after_db > before_db + _noise_db(fit):
         return updated
@@ -81,7 +77,21 @@ def keep_if_better(updated: UpdatedModel, fit: ModalFit) -> UpdatedModel:
     )
 
 
-def median_deviation_db(fit: ModalFit, model: ReducedModel, gains: FloatArray | None = None) -> float:
+def _changed_db(updated: UpdatedModel) -> tuple[float, float]:
+    """Levels of the nominal and the updated model over that of the one that is nearer to the test, dB.
+
+    0 as far as they differ by no more than their deviation.
+    """
+    scales = updated.nominal_scale, updated.scale
+    before, after = (-DB * float(np.log(scale.level)) for scale in scales)
+    std = DB * float(np.hypot(*(scale.level_std for scale in scales)))
+    change = float(np.copysign(max(abs(after - before) - std, 0.0), after - before))
+    return (-change, 0.0) if abs(before) > abs(after) else (0.0, change)
+
+
+def median_deviation_db(
+    fit: ModalFit, model: ReducedModel, gains: FloatArray | None = None, *, level_db: float = 0.0
+) -> float:
     """Tell how far a model is from the measured FRFs.
 
     Parameters
@@ -92,21 +102,20 @@ def median_deviation_db(fit: ModalFit, model: ReducedModel, gains: FloatArray | 
         The model.
     gains : (n_frfs,) array, optional
         Of the measured FRFs over it; 1 where they are left out.
+    level_db : float
+        Of the model, dB, that is none of the factor that all FRFs share.
 
     Returns
     -------
     float
         Median over all lines above their noise, beside one factor that all FRFs share, dB; 0 where there is none.
     """
-    off_db = _off_db(fit, model, gains)
-    return float(np.median(np.abs(off_db - np.median(off_db)))) if off_db.size else 0.0
-
-
-def _off_db(fit: ModalFit, model: ReducedModel, gains: FloatArray | None) -> FloatArray:
-    """Model over measured FRFs, dB, on the lines above their noise."""
     s, measured, is_heard = _heard(fit)
+    if not is_heard.any():
+        return 0.0
     values = np.abs(compute_frfs(model, fit.labels, s) * (1.0 if gains is None else gains))[is_heard]
-    return np.asarray(DB * np.log(np.maximum(values, np.finfo(float).tiny) / measured[is_heard]))
+    off_db = DB * np.log(np.maximum(values, np.finfo(float).tiny) / measured[is_heard])
+    return float(np.median(np.abs(off_db - np.median(off_db) + level_db)))
 
 
 def _heard(fit: ModalFit) -> tuple[ComplexArray, FloatArray, BoolArray]:
