@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.structure import ReducedModel
+    from frf_ipz.updating.scale import MeasuredScale
 else:
     pd = import_late("pandas")
 
@@ -50,13 +51,10 @@ def keep_if_better(updated: UpdatedModel, fit: ModalFit) -> UpdatedModel:
     """
     if not fit.labels or updated.model is updated.nominal or not len(updated.after):
         return updated
+    models, scales = (updated.nominal, updated.model), (updated.nominal_scale, updated.scale)
     before_db, after_db = (
         median_deviation_db(fit, model, np.abs(scale.gains(fit.labels)), level_db=level_db)
-        for (model, scale), level_db in zip(
-            ((updated.nominal, updated.nominal_scale), (updated.model, updated.scale)),
-            _changed_db(updated),
-            strict=True,
-        )
+        for model, scale, level_db in zip(models, scales, _changed_db(*scales), strict=True)
     )
     if not after_db > before_db + _noise_db(fit):
         return updated
@@ -77,14 +75,13 @@ def keep_if_better(updated: UpdatedModel, fit: ModalFit) -> UpdatedModel:
     )
 
 
-def _changed_db(updated: UpdatedModel) -> tuple[float, float]:
+def _changed_db(nominal: MeasuredScale, updated: MeasuredScale) -> tuple[float, float]:
     """Levels of the nominal and the updated model over that of the one that is nearer to the test, dB.
 
     0 as far as they differ by no more than their deviation.
     """
-    scales = updated.nominal_scale, updated.scale
-    before, after = (-DB * float(np.log(scale.level)) for scale in scales)
-    std = DB * float(np.hypot(*(scale.level_std for scale in scales)))
+    before, after = (-DB * float(np.log(scale.level)) for scale in (nominal, updated))
+    std = DB * float(np.hypot(nominal.level_std, updated.level_std))
     change = float(np.copysign(max(abs(after - before) - std, 0.0), after - before))
     return (-change, 0.0) if abs(before) > abs(after) else (0.0, change)
 

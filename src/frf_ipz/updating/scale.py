@@ -8,8 +8,8 @@ proportion to the mean amplitude of the FRF, whose size follows from the scatter
 
 Where the scale is known, the gain common to all FRFs is fitted all the same: it shows by how much the mass of the model
 is in doubt, which poles and zeros do not tell. The model stays as it is (a slip in the units of the test looks alike).
-As many members of the ensemble as `mass_evidence` finds probable take the gain that was found for that of the structure:
-bands reach from the model to it, and hold the truth either way.
+As many members of the ensemble as `mass_evidence` finds probable take the gain that was found for that of the
+structure: bands reach from the model to it, and hold the truth either way.
 
 Masses differ along a structure too, which poles and zeros hardly tell beside stiffness. The squares of the amplitudes
 of all modes at a point add up to 1 over the mass that moves there, so that members have amplitudes of their own at
