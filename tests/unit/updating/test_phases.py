@@ -65,8 +65,7 @@ def test_stiffness_slopes_against_differences(problem):
     assert np.abs(slopes - expected).max() < SLOPES * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("has_damper", [False, True])
-def test_damping_slopes_against_differences(case, has_damper):
+def damping_phase(case, *, has_damper=False):
     basis = make_structural_basis(case.structure.nominal_model, case.reduced_model)
     problem = make_problem(case.reduced_model, case.fit, case.pairs, basis)
     if has_damper:
@@ -77,12 +76,37 @@ def test_damping_slopes_against_differences(case, has_damper):
     phase = minimal_change._stiffness_phase(problem, frame)
     result = iterate(phase, phase.named_roots(np.zeros(len(phase.basis.names)), problem.computed))
     inner = modal_frame(*phase.matrices(result.theta))
-    damping = minimal_change._damping_phase(problem, frame, inner, phase, result, np.zeros(len(problem.values)))
+    return minimal_change._damping_phase(problem, frame, inner, phase, result, np.zeros(len(problem.values)))
+
+
+@pytest.mark.parametrize("has_damper", [False, True])
+def test_damping_slopes_against_differences(case, has_damper):
+    damping = damping_phase(case, has_damper=has_damper)
     count = damping.terms[0].root.shape[0]
     theta = 0.02 * np.random.default_rng(1).standard_normal(count)
     slopes = damping.slopes(theta, damping.roots(theta))
     expected = -differences(lambda step: damping.errors(damping.roots(theta + step)), count)
     assert np.abs(slopes - expected).max() < 10 * SLOPES * np.abs(expected).max()
+
+
+def test_a_real_part_that_no_damping_makes_tells_as_little_as_it_lies_beyond():
+    """Of the other sign, or of ten times what the rates of all modes make: of a zero beside another, by its shapes."""
+    phase = damping_phase(make_update_case(11))
+    zero = int(phase.target_roots.zeros[0])
+    for factor, least in ((1.0, 0.0), (-3.0, 2.0), (10.0, 10.0 - np.e**2)):
+        targets = phase.targets.copy()
+        targets[zero] *= factor
+        beyond = replace(phase, targets=targets).beyond_damping()
+        assert np.delete(beyond, zero).max() == 0.0
+        assert least <= beyond[zero] <= abs(factor)
+
+
+def test_a_pole_is_as_damped_as_it_is_measured():
+    """And so are the zeros beside it."""
+    phase = damping_phase(make_update_case(11))
+    pole = int(phase.target_roots.poles[1])
+    targets = np.where(np.arange(len(phase.targets)) == pole, 10.0, 1.0) * phase.targets
+    assert replace(phase, targets=targets).beyond_damping()[pole] == 0.0
 
 
 def test_an_indefinite_stiffness_is_refused(problem):

@@ -24,6 +24,7 @@ from frf_ipz.updating.tracking import TargetRoots, TrackedRoots, nominal_roots, 
 
 COMMON_STD = 1.5  # of the logarithm of the factor common to all modes
 MODE_STD = 0.3  # of the logarithm of the factor of each mode
+WIDEST = np.e  # of a mode's rate, more than three standard deviations of its logarithm
 DASHPOT_STD = 0.1  # of the relative change of all dampers
 COUPLING_STD = 0.1  # of a coupling, relative to the two modes' rates
 LARGEST_STEP = 1.5  # of a logarithm in one iteration: the real part is not linear in it
@@ -205,6 +206,35 @@ class DampingPhase:
                 result[indices[part]] = rows / self.sizes[indices[part], None]
         return result
 
+    def beyond_damping(self) -> FloatArray:
+        """Give how far zeros lie beyond what damping can make of them, whatever the rate of each mode.
+
+        Where two zeros nearly meet, damping and shapes part them, and their real parts are large and of both signs.
+        What modes with up to `WIDEST` of their rates make, or of those of their measured poles, is between the sums of
+        their negative and of their positive shares.
+
+        Returns
+        -------
+        (n,) array
+            Relative to the sizes; 0 within, and of poles.
+        """
+        start = unwhiten(self.terms, np.array([term.std for term in self.terms]), self.start())
+        roots = self.initial_roots()
+        slopes, measured = self.slopes(start, roots), self.targets / self.sizes
+        computed = measured - self.errors(roots)
+        of_modes, poles = slopes[:, 1 : 1 + len(self.rates)], self.target_roots.poles
+        shares = np.column_stack([of_modes, computed - of_modes.sum(axis=1)])  # last that of dampers
+        if len(poles):
+            modes = np.argmax(np.abs(roots.groups[0][1].right_vectors), axis=0)
+            shares[:, modes] *= np.maximum(measured[poles] / computed[poles], 1.0)
+        spread = np.zeros(len(slopes))
+        for term in self.terms[2:]:
+            spread += term.std**2 * np.sum(term.by_whitened(slopes) ** 2, axis=1)
+        least = WIDEST * (np.minimum(shares, 0.0).sum(axis=1) - np.sqrt(spread))
+        most = WIDEST * (np.maximum(shares, 0.0).sum(axis=1) + np.sqrt(spread))
+        beyond = np.maximum(np.maximum(least - measured, measured - most), 0.0)
+        return np.where(self.target_roots.frf < 0, 0.0, beyond)
+
     def _mode_rates(self, theta: FloatArray) -> FloatArray:
         """Rates of the modes."""
         return np.asarray(self.rates * np.exp(theta[..., :1] + theta[..., 1 : 1 + len(self.rates)]))
@@ -291,7 +321,7 @@ def damping_phase(
     target_undamped = nominal_roots(target_roots, np.eye(len(rates)), np.diag(inner.eigenvalues), undamped)
     from_shapes = _real_parts(target_undamped, len(values)) / sizes
     pairs = np.triu_indices(min(len(rates), MOST_COUPLED_MODES), 1)
-    return DampingPhase(
+    phase = DampingPhase(
         eigenvalues=inner.eigenvalues,
         rates=rates,
         shape=shape,
@@ -305,6 +335,7 @@ def damping_phase(
         pairs=pairs,
         noise=noise.over(sizes).plus(SMALLEST_NOISE**2 + from_shapes**2),
     )
+    return replace(phase, noise=phase.noise.plus(phase.beyond_damping() ** 2))
 
 
 def _real_parts(undamped: TrackedRoots, count: int) -> FloatArray:
