@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.errors import FileFormatError, errors_of_file
+from frf_ipz.ingest.formats.column_words import FREQUENCY, TIME, frf_role
 from frf_ipz.ingest.formats.text_layout import STAMP, is_number, is_stamp, name_and_unit
 from frf_ipz.ingest.formats.text_table import column_index
 from frf_ipz.ingest.formats.time_stamps import DAY_S, unit_of_stamps
@@ -30,17 +31,11 @@ OTHER_HEADER = "; where another line names the columns, write header_row = ... u
 EVEN = 0.02  # of the step between printed times: twice what the contract allows, since digits are rounded
 LETTERS_SHOWN, NAMES_SHOWN = 40, 10  # of names of columns, in a message
 FEWEST_ROWS = 3  # two steps can be compared
-TIME = re.compile(
-    r"^(elapsed|relative|abs(olute)?)?[ _]*(t|time|zeit|temps|tempo|tiempo|tid|tijd|x[ _-]?value|x[ _-]?axis|"
-    r"seconds?|secs?|timestamp|zeitstempel|date ?time|milliseconds?|microseconds?|millis|micros)(?![a-z])",
-    re.IGNORECASE,
-)
 TIME_UNIT = re.compile(
     r"(?:^|[ _/.,])(s|sec|secs|seconds?|ms|msec|millis|milliseconds?|us|µs|micros|microseconds?|ns|min|h|hours?|d|"
     r"days?)$",
     re.IGNORECASE,
 )
-FREQUENCY = re.compile(r"freq|frequenz|\bhz\b", re.IGNORECASE)
 PRINTED = re.compile(r"[-+]?[0-9]*(?:[.,]([0-9]*))?(?:[eEdD]([-+]?[0-9]{1,3}))?")
 ENCODINGS = (  # of names that are not in UTF-8, beside Latin-1: of Windows, of DOS, of Macs
     *("cp1252", "cp932", "gb18030", "cp950", "cp949", "euc_jp", "cp1250", "cp1251", "cp1253", "cp1254", "cp1255"),
@@ -312,8 +307,11 @@ def _find_time(
     for index in free:
         if TIME.match(names[index]) and _is_time_unit(units[index]) and (index or not counts_samples):
             return index
+    for index in free:
+        if _holds_stamps(layout, index):
+            return index
     place = 1 if counts_samples else 0
-    if place not in free or FREQUENCY.search(names[place]) or not _is_time_unit(units[place]):
+    if place not in free or frf_role(names[place]) == FREQUENCY or not _is_time_unit(units[place]):
         return None
     return place if _grows(layout, place) and not _counts_samples(layout, names, units, place) else None
 
@@ -328,10 +326,13 @@ def _counts_samples(layout: TextLayout, names: Sequence[str], units: Sequence[st
     )
 
 
+def _holds_stamps(layout: TextLayout, index: int) -> bool:
+    """Tell a column of times of day, whatever it is called and whatever stands before it: dates, numbers of lines."""
+    return all(is_stamp(fields[index]) for fields in layout.rows if index < len(fields))
+
+
 def _grows(layout: TextLayout, index: int) -> bool:
     """Tell whether a column grows from row to row, by steps that are equal but for a few."""
-    if all(is_stamp(fields[index]) for fields in layout.rows if index < len(fields)):
-        return True
     steps = np.diff(_column(layout, index))
     if len(steps) < FEWEST_ROWS - 1 or not (steps > 0.0).all():
         return False
