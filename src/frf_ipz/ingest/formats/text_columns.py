@@ -13,7 +13,7 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.ingest.formats.column_words import FREQUENCY, TIME, frf_role
-from frf_ipz.ingest.formats.text_layout import STAMP, is_number, is_stamp, name_and_unit
+from frf_ipz.ingest.formats.text_layout import DELIMITERS, STAMP, is_number, is_stamp, name_and_unit, split_line
 from frf_ipz.ingest.formats.text_table import column_index
 from frf_ipz.ingest.formats.time_stamps import DAY_S, unit_of_stamps
 from frf_ipz.ingest.units import is_unit
@@ -41,6 +41,7 @@ ENCODINGS = (  # of names that are not in UTF-8, beside Latin-1: of Windows, of 
     *("cp1252", "cp932", "gb18030", "cp950", "cp949", "euc_jp", "cp1250", "cp1251", "cp1253", "cp1254", "cp1255"),
     *("cp437", "cp850", "cp852", "cp866", "koi8_r", "mac_roman"),
 )
+NUMBER_WITH_UNIT = re.compile(r"([-+]?[0-9.,]+(?:[eE][-+]?[0-9]+)?) ?([^\W\d].*)")
 REMARK = re.compile(r"comments?|kommentare?|remarks?", re.IGNORECASE)
 
 
@@ -295,9 +296,23 @@ def _match_width(layout: TextLayout, fields: Sequence[str]) -> list[str] | None:
 
 
 def _wrong_width(layout: TextLayout, fields: Sequence[str]) -> FileFormatError:
+    cell = _cell_with_unit(" ".join(layout.rows[0]))
+    if cell:
+        problem = f"has units in its cells, as in '{cell}', where numbers alone are read: export it without them, and "
+        problem += "write the units behind the names in the header, as in 'force [N]'"
+        return FileFormatError(layout.path, problem, where=f"line {layout.n_before + 1}")
     problem = f"has {counted(layout.n_columns, 'value')} where the header has {counted(len(fields), 'column')}"
     hint = "; a decimal comma needs semicolons or tabs between the columns" if layout.delimiter == "," else ""
     return FileFormatError(layout.path, problem + hint + OTHER_HEADER, where=f"line {layout.n_before + 1}")
+
+
+def _cell_with_unit(line: str) -> str:
+    """Find a cell that holds a number and its unit behind it; empty where not all cells of a line are so."""
+    for delimiter in DELIMITERS[:-1]:
+        matches = [NUMBER_WITH_UNIT.fullmatch(cell) for cell in split_line(line, delimiter)]
+        if len(matches) > 1 and all(match and is_number(match[1]) and is_unit(match[2]) for match in matches):
+            return split_line(line, delimiter)[-1]
+    return ""
 
 
 def _find_time(
