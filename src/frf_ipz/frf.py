@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 SCALES = ("none", "common", "per_channel")
+IN_THOUSANDS = "the frequencies are in kHz, or the time of the recordings is in ms"
 ARRAYS = ("frequency_hz", "values", "variance", "coherence", "averages")
 
 
@@ -400,18 +401,24 @@ class FrfSet(Tabulated, Drawn):
         Raises
         ------
         InputError
-            If no line remains.
+            If no line remains; names `band_hz` or `exclude_hz`, whichever leaves none.
         """
         frequency = self.frequency_hz
-        used = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+        used = in_band = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
         for low, high in exclude_hz:
-            used &= (frequency < low) | (frequency > high)
+            used = used & ((frequency < low) | (frequency > high))
+        if in_band.any() and not used.any():
+            listed = ", ".join(f"{low:g} to {high:g} Hz" for low, high in exclude_hz)
+            raise InputError(
+                f"[fit] exclude_hz leaves no frequency line of the band {band_hz[0]:g} to {band_hz[1]:g} Hz: it takes "
+                f"{listed}; exclude less of it"
+            )
         if not used.any():
-            in_ms = frequency[-1] < band_hz[0] <= 1e3 * frequency[-1]
+            held = (1e3 * frequency >= band_hz[0]) & (1e3 * frequency <= band_hz[1])
             raise InputError(
                 f"no frequency line remains in the band {band_hz[0]:g} to {band_hz[1]:g} Hz; the measured lines go "
                 f"from {frequency[0]:g} to {frequency[-1]:g} Hz, so set another [fit] band_hz"
-                + ("; or the time of the recordings is in ms: name that unit in the column's header" if in_ms else "")
+                + (f"; or {IN_THOUSANDS}: name that unit in the column's header" if held.sum() > 1 else "")
             )
         return used
 

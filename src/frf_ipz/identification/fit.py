@@ -253,7 +253,7 @@ def _as_modal_fit(frfs: FrfSet, fitted: FittedModes, options: FitOptions, halves
         gain=gains.of_frf,
         channel_gains=gains.table,
         noise_from=fitted.noise_from,
-        warnings=(*_warnings(frfs, fitted, halves, unconfirmed), *gains.remarks),
+        warnings=(*_idle_exclusions(frfs, options), *_warnings(frfs, fitted, halves, unconfirmed), *gains.remarks),
         unknown_scale=frfs.unknown_scale,
         missed=_beyond_noise(misfit, np.sqrt(fitted.noise) * unit),
     )
@@ -332,6 +332,22 @@ def _by_chance(frfs: FrfSet) -> FloatArray:
     """Misfit over noise, (n_frfs,), that the scatter of a few records makes by chance, all lines alike at worst."""
     n_free = np.maximum(frfs.averages - 1.0, 1.0)  # complex numbers that tell the noise
     return np.where(frfs.averages > 1, np.sqrt(n_free / gammaincinv(n_free, CHANCE / frfs.n_frfs)), 1.0)
+
+
+def _idle_exclusions(frfs: FrfSet, options: FitOptions) -> tuple[str, ...]:
+    """Name bands that are excluded and hold no line that would be fitted without that."""
+    lines_hz = frfs.frequency_hz
+    low, high = options.band_hz or (float(lines_hz[0]), float(lines_hz[-1]))
+    lines_hz = lines_hz[(lines_hz >= low) & (lines_hz <= high)]
+    idle = [
+        f"{first:g} to {last:g} Hz"
+        for first, last in options.exclude_hz
+        if not ((lines_hz >= first) & (lines_hz <= last)).any()
+    ]
+    if not idle:
+        return ()
+    text = f"[fit] exclude_hz takes out no line by {', '.join(idle)}: the lines of the band go from"
+    return (f"{text} {lines_hz[0]:g} to {lines_hz[-1]:g} Hz",)
 
 
 def _warnings(

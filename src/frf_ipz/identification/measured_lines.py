@@ -212,7 +212,7 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
     Raises
     ------
     InputError
-        If too few lines remain.
+        If too few lines remain, or a pole is pinned or rejected outside of them.
     """
     known = np.asarray(np.isfinite(frfs.variance).any(axis=0), bool)
     usable = _usable(frfs, known)
@@ -229,11 +229,14 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
                 f"{band[0]:g} to {band[1]:g} Hz; a fit needs {FEWEST_LINES}: check the measurement and its channels, "
                 "or set [fit] band_hz to where there is a signal"
             )
+        excluded = int((usable & independent & frfs.in_band(band)).sum()) >= FEWEST_LINES
+        way_out = "exclude less of it by [fit] exclude_hz" if excluded else "set a wider [fit] band_hz"
         raise InputError(
             f"only {int(used.sum())} usable frequency lines remain in the band {band[0]:g} to {band[1]:g} Hz; "
-            f"a fit needs {FEWEST_LINES}: set a wider [fit] band_hz or a finer frequency resolution"
+            f"a fit needs {FEWEST_LINES}: {way_out}{'' if excluded else ' or a finer frequency resolution'}"
         )
     lines = frfs.select_lines(used)
+    options.require_within((float(lines.frequency_hz[0]), float(lines.frequency_hz[-1])))
     powers = np.array([label.quantity.power for label in frfs.labels])
     if not known.all():  # once more in the band alone: the noise outside may be of another size
         noise[np.ix_(used, ~known)] = rough_variance(lines.values[:, ~known])

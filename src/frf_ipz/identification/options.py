@@ -9,6 +9,8 @@ from frf_ipz.errors import InputError
 from frf_ipz.option_types import Count, Frequency, Positive
 from frf_ipz.toml_files import STRICT, check_values
 
+NEAR_PIN = 0.02  # relative distance up to which a pole is the one that was pinned or rejected
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RejectedPole:
@@ -161,3 +163,25 @@ class FitOptions:
     def pinned(self) -> tuple[PinnedPole, ...]:
         """Every pin with its reason, which is empty for a plain number."""
         return tuple(pin if isinstance(pin, PinnedPole) else PinnedPole(hz=pin) for pin in self.pin_hz)
+
+    def require_within(self, band_hz: tuple[float, float]) -> None:
+        """Refuse frequencies of poles that lie outside of the band that is fitted, where nothing can show a pole.
+
+        Parameters
+        ----------
+        band_hz : pair of float
+            Its first and last line, Hz.
+
+        Raises
+        ------
+        InputError
+            Names the key. A pole that is as near to the band as `NEAR_PIN` belongs to it.
+        """
+        low, high = band_hz[0] * (1.0 - NEAR_PIN), band_hz[1] * (1.0 + NEAR_PIN)
+        named = [("pin_hz", pin.hz) for pin in self.pinned] + [("strike", pole.hz) for pole in self.strike]
+        outside = [f"{key} at {hz:g} Hz" for key, hz in named if not low <= hz <= high]
+        if outside:
+            raise InputError(
+                f"[fit] {', '.join(outside)}: outside of the band that is fitted, {band_hz[0]:g} to {band_hz[1]:g} Hz, "
+                "where no line shows a pole; correct the frequency in Hz, take it out, or set [fit] band_hz around it"
+            )

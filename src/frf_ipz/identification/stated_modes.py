@@ -27,6 +27,8 @@ else:
 
 FREQUENCY_STD, DAMPING_STD = 1e-3, 0.1  # relative, where none is stated
 STATED = "stated"
+OUTSIDE = "outside of the band"
+OF_FRFS = ("pin_hz", "max_order", "delay", "gain")  # keys of [fit] that a fit to FRFs asks for
 STRUCK = 1e-2  # relative distance within which a pole is the one that the user has struck
 
 
@@ -51,14 +53,15 @@ def take_stated_modes(modes: ModalParameters, options: FitOptions) -> ModalFit:
         If no mode lies in the band.
     """
     band_hz = options.band_hz or modes.band_hz
+    options.require_within(band_hz)
     decisions = [_left_out(float(hz), band_hz, options) for hz in modes.natural_frequency_hz]
     kept = [place for place, reason in enumerate(decisions) if not reason]
     if not kept:
         listed = ", ".join(f"{hz:.6g}" for hz in modes.natural_frequency_hz)
-        raise InputError(
-            f"no mode of the test lies in the band {band_hz[0]:g} to {band_hz[1]:g} Hz; they are at {listed} Hz: set "
-            "another [fit] band_hz"
-        )
+        taken_out = [reason for reason in decisions if reason != OUTSIDE]
+        problem = f"no mode of the test {'is left' if taken_out else 'lies'} in the band"
+        way_out = "take less out by [fit] exclude_hz and strike" if taken_out else "set another [fit] band_hz"
+        raise InputError(f"{problem} {band_hz[0]:g} to {band_hz[1]:g} Hz; they are at {listed} Hz: {way_out}")
     given = modes.select(kept)
     frequency_std, ratio_std, note = _deviations(given)
     poles = underdamped_poles(given.natural_frequency_hz, given.damping_ratio)
@@ -106,7 +109,7 @@ def take_stated_modes(modes: ModalParameters, options: FitOptions) -> ModalFit:
         gain=np.zeros(0),
         channel_gains=pd.DataFrame(columns=["channel", "gain", "gain_std"]),
         noise_from=STATED,
-        warnings=note,
+        warnings=(*note, *_idle_keys(modes, options)),
         modes_given=given,
     )
 
@@ -114,10 +117,21 @@ def take_stated_modes(modes: ModalParameters, options: FitOptions) -> ModalFit:
 def _left_out(hertz: float, band_hz: tuple[float, float], options: FitOptions) -> str:
     """Say why a mode does not count; empty where it does."""
     if not band_hz[0] <= hertz <= band_hz[1]:
-        return "outside of the band"
+        return OUTSIDE
     if any(low <= hertz <= high for low, high in options.exclude_hz):
         return "in a band that is left out"
     return next((pole.why for pole in options.strike if abs(pole.hz / hertz - 1) < STRUCK), "")
+
+
+def _idle_keys(modes: ModalParameters, options: FitOptions) -> tuple[str, ...]:
+    """Name keys of ``[fit]`` that have no effect on modes that were identified elsewhere."""
+    idle = [key for key in OF_FRFS if getattr(options, key) not in (None, ())]
+    texts = [f"[fit] {', '.join(idle)}: no effect, as the modes were identified elsewhere"] if idle else []
+    hertz = modes.natural_frequency_hz
+    missed = [f"{pole.hz:g} Hz" for pole in options.strike if not (np.abs(pole.hz / hertz - 1) < STRUCK).any()]
+    if missed:
+        texts.append(f"[fit] strike takes out no mode at {', '.join(missed)}: none is there")
+    return tuple(texts)
 
 
 def _deviations(modes: ModalParameters) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:

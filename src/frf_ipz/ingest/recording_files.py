@@ -288,6 +288,8 @@ class UniformTimeCheck:
         tolerance = UNIFORM * abs(self._median) + (self._resolution if can_tell else 0.0)
         wrong = ~(np.abs(steps - self._median) <= tolerance) | (steps <= 0.0)
         if wrong.any() and not self._is_rounded(time):
+            if self._median == 0.0:
+                raise self._stands_still(steps)
             is_coarse = self._median > 0.0 and not can_tell
             coarse = f"its times are rounded to {self._resolution:.2g} s, and " if is_coarse else ""
             position = int(np.argmax(wrong))
@@ -301,6 +303,16 @@ class UniformTimeCheck:
             )
         self._n_rows += len(time)
         self._last = time[-1:]
+
+    def _stands_still(self, steps: FloatArray) -> FileFormatError:
+        row = self._n_rows + int(np.argmax(steps == 0.0)) + (self._n_rows == 0)
+        share = 100.0 * float(np.mean(steps == 0.0))
+        return FileFormatError(
+            self._path,
+            f"the time stands still in {share:.0f} % of the first rows: it is written with too few digits for its "
+            "rate; write it with more digits, or write sample_rate_hz = ... under [test]",
+            where=f"{self._row_name} {self._line_of_row(row)}, column '{self._column}'",
+        )
 
     def _is_rounded(self, time: FloatArray) -> bool:
         """Tell whether times lie on a straight line but for the decimal digits that they are rounded to."""

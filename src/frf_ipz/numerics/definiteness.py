@@ -39,7 +39,7 @@ ESTIMATE_TOLERANCE = 1e-2  # of the largest eigenvalue, which is only a yardstic
 GYROSCOPIC = (
     "a skew-symmetric part is that of gyroscopic (Coriolis) forces, of what rotates, or of circulatory ones, of "
     "journal bearings and followers; the method needs symmetric matrices: measure the structure at rest, and hand in "
-    "(B + B^T) / 2"
+    "the mean of this matrix and its transpose"
 )
 
 

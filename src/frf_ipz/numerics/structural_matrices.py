@@ -15,6 +15,7 @@ from scipy import sparse
 
 from frf_ipz.arrays import IntArray, require_finite
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
+from frf_ipz.errors import InputError
 from frf_ipz.numerics.constraints import (
     AdmissibleMotions,
     eliminate_multipliers,
@@ -212,7 +213,12 @@ class ExportedRows:
             If it is not symmetric.
         """
         rows = self.free.rows
-        block = symmetrise(matrix[rows][:, rows], rows=rows)
+        try:
+            block = symmetrise(matrix[rows][:, rows], rows=rows)
+        except InputError as error:
+            if what != STRUCTURAL:
+                raise
+            raise InputError(f"has an imaginary part that {error}") from None
         block = self.units.matrix_in_si("stiffness" if what == STRUCTURAL else what, block, self.free.dofs)
         return block if self.turn is None else sparse.csr_array(self.turn.T @ block @ self.turn)
 

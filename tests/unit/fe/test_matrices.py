@@ -228,3 +228,40 @@ def test_coordinates_without_a_unit_are_said_to_be_taken_for_metres(tmp_path):
     assert "the structure is 0.4995 m long; call the columns x_m, y_m, z_m where that is right" in note
     path.write_text(path.read_text(encoding="utf-8").replace("[model]", '[model]\nunits = "mm-t-s"'), encoding="utf-8")
     assert not any("metres" in note for note in read_model(path).notes)
+
+
+@pytest.mark.parametrize("units", ["", 'units = "mm-t-s"'])
+@pytest.mark.parametrize(
+    ("names", "unit_m"), [("x_mm,y_mm,z_mm", 1e-3), ("X [cm],Y [cm],Z [cm]", 1e-2), ("x_in,y_in,z_in", 0.0254)]
+)
+def test_coordinates_are_read_in_the_unit_of_their_names(tmp_path, names, unit_m, units):
+    model = beam(left="clamped")
+    path = export(tmp_path, model)
+    _, *rows = (tmp_path / "dofs.csv").read_text(encoding="utf-8").splitlines()
+    scaled = [
+        ",".join([*row.split(",")[:2], *(repr(float(place) / unit_m) for place in row.split(",")[2:])]) for row in rows
+    ]
+    (tmp_path / "dofs.csv").write_text("\n".join([f"node,direction,{names}", *scaled]), encoding="utf-8")
+    path.write_text(path.read_text(encoding="utf-8").replace("[model]", f"[model]\n{units}"), encoding="utf-8")
+    exported = read_model(path)
+    assert_allclose(exported.geometry.coordinates_m, model.geometry.coordinates_m[1:], rtol=0, atol=PRINTED)
+    assert not any("metres" in note for note in exported.notes)
+
+
+def test_coordinates_in_different_units_are_refused(tmp_path):
+    path = export(tmp_path, beam())
+    table = tmp_path / "dofs.csv"
+    table.write_text(table.read_text(encoding="utf-8").replace("x_m,y_m,z_m", "x_mm,y_mm,z_m"), encoding="utf-8")
+    with pytest.raises(
+        FileFormatError, match=r"coordinates in different units: x_mm, y_mm, z_m; write all three in one"
+    ):
+        read_model(path)
+
+
+def test_an_imaginary_part_that_is_not_symmetric_is_named_as_that(tmp_path):
+    path = export(tmp_path, beam(left="clamped"))
+    stiffness = io.mmread(tmp_path / "K.mtx").toarray().astype(complex) * (1 + 0.02j)
+    stiffness[0, 2] += 0.01j * stiffness[0, 2].real
+    io.mmwrite(tmp_path / "K.mtx", sparse.coo_array(stiffness), symmetry="general", precision=17)
+    with pytest.raises(FileFormatError, match=r"K\.mtx: has an imaginary part that is not symmetric: .* rows 1 and 3"):
+        read_model(path)

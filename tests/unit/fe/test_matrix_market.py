@@ -146,7 +146,14 @@ HEADERS = {
     "announced entries without end": (REAL + "3 3 4000000000000\n" + LOWER, ["4000000000000 entries", "5 follow"]),
     "pattern": (REAL.replace("real", "pattern") + "3 3 1\n1 1\n", ["pattern"]),
     "fractions under integer": (REAL.replace("real", "integer") + "3 3 5\n" + LOWER, ["fractions"]),
-    "skew": (REAL.replace("symmetric", "skew-symmetric") + "3 3 1\n2 1 -800\n", ["gyroscopic"]),
+    "skew": (
+        REAL.replace("symmetric", "skew-symmetric") + "3 3 1\n2 1 -800\n",
+        ["no stiffness is", "gyroscopic", "export it again"],
+    ),
+    "skew with a diagonal": (
+        REAL.replace("symmetric", "skew-symmetric") + "3 3 5\n" + LOWER,
+        ["its diagonal is not zero", "write symmetric in that line"],
+    ),
     "hermitian with imaginary parts": (
         REAL.replace("real symmetric", "complex hermitian")
         + "3 3 5\n"

@@ -111,6 +111,15 @@ def test_an_impact_that_contradicts_is_named_and_left_out(tmp_path, change, mark
     assert truth_error(result).max() < 0.01
 
 
+def test_an_impact_at_another_point_is_compared_with_what_the_others_make_of_its_force(tmp_path):
+    def strike_elsewhere(signals):
+        signals[1:] = np.cumsum(signals[1:], axis=1)
+        return signals
+
+    mark = estimate(tmp_path, strike_elsewhere).records.marks[2]
+    assert "% off what the other impacts make of its force (median over the lines, where noise and their own" in mark
+
+
 def test_lost_samples_are_found_where_four_impacts_hardly_tell_that_one_is_wrong(tmp_path):
     result = estimate(tmp_path, lose_samples_late, impacts=4)
     assert list(result.records.used) == [True, True, False, True]

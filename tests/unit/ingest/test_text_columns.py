@@ -308,6 +308,21 @@ def test_stamps_of_too_few_digits_need_a_rate(tmp_path):
     expect(read(path, "sample_rate_hz = 2048.0"))
 
 
+def test_times_that_stand_still_are_said_to_have_too_few_digits(tmp_path):
+    change = lines_with(lambda number, fields: ",".join([f"{number / RATE_HZ:.2f}", *fields[1:]]))
+    text = message(write(tmp_path, change))
+    assert re.search(r"line 3, column 'time': the time stands still in 9\d % .* too few digits .* sample_rate_hz", text)
+
+
+def test_units_in_the_cells_are_named(tmp_path):
+    units = ("s", "N", "m/s²", "m/s²")
+    change = lines_with(
+        lambda _, fields: ",".join(f"{field} {unit}" for field, unit in zip(fields, units, strict=True))
+    )
+    text = message(write(tmp_path, change))
+    assert re.search(r"line 2: has units in its cells, as in '\S+ m/s²', .* write the units behind the names", text)
+
+
 @pytest.mark.parametrize(
     "footer", ["End of data\n", "\n\nEnd of data", "Max,12.3,4.5,6\n", "Samples: 256\nDone\n" * 9000]
 )

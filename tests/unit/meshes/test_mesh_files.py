@@ -174,3 +174,10 @@ def test_a_collapsed_quadrilateral_is_a_triangle_whose_last_corner_stands_there_
     corners = [(1, 1, 2, 3), (4, 5, 6, 4), (7, 8, 8, 9), (7, 7, 8, 8)]
     faces = outer_faces([("quadrilateral", nodes) for nodes in corners])
     assert faces.tolist() == [[2, 3, 1, 1], [5, 6, 4, 4], [9, 7, 8, 8]]
+
+
+def test_positions_are_read_in_the_unit_of_their_names(tmp_path):
+    path = tmp_path / "nodes.csv"
+    path.write_text("node,x_mm,y_mm,z_mm\n1,20,0,0\n", encoding="utf-8")
+    stored = read_mesh(path)
+    assert (stored.unit_m, list(stored.positions.values())) == (1e-3, [(20.0, 0.0, 0.0)])

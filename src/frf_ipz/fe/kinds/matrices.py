@@ -250,7 +250,10 @@ class _Files:
         order = None if table is None else len(table.dofs)
         whole: dict[str, StoredMatrix] = {}
         dofs = () if table is None else table.dofs
-        positions = dict(table.positions) if table is not None else {}
+        scale = 1.0 if table is None else (table.unit_m or unit_m) / unit_m
+        positions: dict[int, Sequence[float]] = {
+            node: tuple(scale * place for place in xyz) for node, xyz in (table.positions.items() if table else ())
+        }
         for what, name in names.items():
             stored = _read_one(path, what, name, options, order=order, ordered_by=ordered_by)
             if not dofs:

@@ -12,6 +12,7 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.dofs import DIRECTIONS, GENERALISED, Dof
 from frf_ipz.errors import FileFormatError, did_you_mean, errors_of_file
 from frf_ipz.input_files import read_text
+from frf_ipz.meshes.coordinate_names import coordinate_unit
 from frf_ipz.text_numbers import parse_number
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ class DofTable:
         Selections of the rows, where matrices may have one of several.
     without_unit : bool
         Positions stand under x, y, z, which say no unit.
+    unit_m : float, optional
+        Unit of the positions where their columns state another one than the model's, as ``x_mm`` does.
     """
 
     dofs: tuple[Dof, ...]
@@ -53,6 +56,7 @@ class DofTable:
     axes: Mapping[int, FloatArray]
     choices: tuple[DofTable, ...] = ()
     without_unit: bool = False
+    unit_m: float | None = None
 
     def of_order(self, order: int) -> DofTable:
         """Choose the selection of rows that a matrix has.
@@ -92,6 +96,7 @@ def read_dof_table(path: Path) -> DofTable:
     separator = max(SEPARATORS, key=lines_of_text[0].count)
     rows = _csv_rows(lines_of_text, separator, path)
     _, header = next(rows, (1, []))
+    header, unit_m = coordinate_unit(path, header)
     columns = _columns(header, path)
     axes: dict[int, FloatArray] = {}
     lines: dict[Dof, int] = {}
@@ -120,8 +125,8 @@ def read_dof_table(path: Path) -> DofTable:
             raise FileFormatError(path, f"node {dof.node} has other coordinates in an earlier line", where=where)
     if not lines:
         raise FileFormatError(path, "names no DOF; one row a row of the matrices is needed")
-    without_unit = bool(PLAIN.keys() & {name.strip().lower() for name in header})
-    return DofTable(dofs=tuple(lines), positions=positions, axes=axes, without_unit=without_unit)
+    without_unit = unit_m is None and bool(PLAIN.keys() & set(header))
+    return DofTable(dofs=tuple(lines), positions=positions, axes=axes, without_unit=without_unit, unit_m=unit_m)
 
 
 def _csv_rows(lines: list[str], separator: str, path: Path) -> Iterator[tuple[int, list[str]]]:
@@ -135,14 +140,16 @@ def _csv_rows(lines: list[str], separator: str, path: Path) -> Iterator[tuple[in
 
 
 def _columns(header: list[str], path: Path) -> Mapping[str, int]:
-    names = [PLAIN.get(name.strip().lower(), name.strip().lower()) for name in header]
+    names = [PLAIN.get(name, name) for name in header]
     columns = {name: index for index, name in enumerate(names)}
     for name in COLUMNS:
         if names.count(name) > 1:
             raise FileFormatError(path, f"names the column '{name}' twice; rename one", where="line 1")
         if name not in columns:
             raise FileFormatError(
-                path, f"has no column '{name}'; expected is the header {','.join(COLUMNS)}", where="line 1"
+                path,
+                f"has no column '{name}'; expected is the header {','.join(COLUMNS)}, or x_mm, y_mm, z_mm",
+                where="line 1",
             )
     return columns
 

@@ -12,6 +12,7 @@ from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 from frf_ipz.identification.likelihood.compression import response
 from frf_ipz.identification.likelihood.refinement import RefinedPoles, refine_poles
 from frf_ipz.identification.measured_lines import WeightedLines
+from frf_ipz.identification.options import NEAR_PIN
 from frf_ipz.identification.search.drift import Drift, find_drift
 from frf_ipz.identification.search.force_error import ForceError, find_force_error, share_beyond_known_noise
 from frf_ipz.identification.search.goodness_of_fit import (
@@ -34,7 +35,6 @@ CLEARED = 0.6  # times the misfit before: poles that were refused then may be pr
 ROUGH_ITERATIONS = 12  # of a fit whose poles are still to be judged
 UNCERTAIN = 0.3  # relative standard deviation of a damping above which a pole is not determined
 SURE = 6.0  # times what the BIC demands: such a pole stays even where its damping is uncertain
-NEAR_PIN = 0.02  # relative distance up to which a pole is the one that was pinned or rejected
 MODEL_ERROR = 1.7  # mean square of the misfit over that of noise, above which the model is to blame
 PIN_REASON = "the user says that a mode is here"  # of a pin without a reason
 FORCE_REASON = "an error of the force that is smooth over the lines explains the misfit as well"

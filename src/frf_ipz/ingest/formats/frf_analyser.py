@@ -2,38 +2,28 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats import frf_text
+from frf_ipz.ingest.formats.column_words import DEGREES, GERMAN, GRAD, frf_role
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf
 from frf_ipz.ingest.formats.text_layout import is_number, name_and_unit, sniff
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from frf_ipz.arrays import ComplexArray
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
-ROLES = (  # of a column, by its name; the first that fits
-    (frf_text.STATED, re.compile(r"freq|^f$|^f ?\[|\bhz\b|^w ?\[|^w$|omega", re.IGNORECASE)),
-    ("coherence", re.compile(r"coh|gamma", re.IGNORECASE)),
-    ("imag", re.compile(r"imag|^im\b", re.IGNORECASE)),
-    ("real", re.compile(r"real|^re\b", re.IGNORECASE)),
-    ("phase_rad", re.compile(r"(pha|angle).*(?<![a-z])rad", re.IGNORECASE)),
-    ("phase_deg", re.compile(r"pha|angle", re.IGNORECASE)),
-    ("magnitude_db", re.compile(r"(mag|amp|abs|mod).*db|^db", re.IGNORECASE)),
-    ("magnitude", re.compile(r"mag|amp|abs|modul", re.IGNORECASE)),
-)
 MAGNITUDES = {"magnitude", "magnitude_db"}
 PHASES = {"real", "imag", "phase_deg", "phase_rad"}
 LABELS = ("output_dof", "input_dof")
-DEGREES = re.compile(r"deg|°|º", re.IGNORECASE)
 LEAST_SPAN = 2.0 * np.pi  # degrees: within it phases without a unit may be radians
 MOST_HEAD = 1 << 12  # bytes in which a binary file shows itself
 
@@ -128,8 +118,10 @@ def find_frf_columns(source: FrfSource) -> AnalyserColumns | None:
             and roles[0] == frf_text.STATED
             and len(set(named)) == len(named)
         ):
-            phase = next((word for word in words if _role(word) == "phase_deg" and not DEGREES.search(word)), "")
-            if phase and any(map(DEGREES.search, (field for row in layout.header for field in row))):
+            phase = next(
+                (word for word in words if frf_role(word) == "phase_deg" and not _states_degrees(word, words)), ""
+            )
+            if phase and any(_states_degrees(field, words) for row in layout.header for field in row):
                 phase = ""  # a row of units says it
             frequency = frf_text.name_of_frequency(frf_text.stated_frequency_unit(layout, 0))
             unit = frf_text.unit_of_values(layout.header, roles)
@@ -138,10 +130,12 @@ def find_frf_columns(source: FrfSource) -> AnalyserColumns | None:
 
 
 def _possible_headers(layout: TextLayout) -> Iterator[tuple[list[str], list[str]]]:
-    """Give the words of each line of text, and what columns of such names are."""
-    for fields in layout.header:
+    """Give the words of each line of text, with those of a row of units below it, and what such columns are."""
+    for fields, below in pairwise([*layout.header, ()]):
         words = [field for field in fields if field and not is_number(field)]
-        roles = [_role(word) or frf_text.SKIP for word in words]
+        if len(words) == len(below) == layout.n_columns:
+            words = [f"{word} [{unit}]" if unit else word for word, unit in zip(words, below, strict=True)]
+        roles = [frf_role(word) or frf_text.SKIP for word in words]
         if len(words) != layout.n_columns:  # units stand between the names
             roles = list(dict.fromkeys(role for role in roles if role != frf_text.SKIP))
         yield words, roles
@@ -174,8 +168,8 @@ def _holds_magnitudes_only(path: Path) -> bool:
     return any(roles[0] == frf_text.STATED and MAGNITUDES & set(roles) and not PHASES & set(roles) for roles in headers)
 
 
-def _role(word: str) -> str:
-    return next((role for role, pattern in ROLES if pattern.search(word)), "")
+def _states_degrees(field: str, names: Sequence[str]) -> bool:
+    return bool(DEGREES.search(field) or (GRAD.search(field) and any(map(GERMAN.search, names))))
 
 
 def _require_degrees(path: Path, found: AnalyserColumns, values: ComplexArray) -> None:

@@ -16,9 +16,9 @@ import numpy as np
 from frf_ipz.arrays import complex_array
 from frf_ipz.dofs import AnyDof, Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean
+from frf_ipz.ingest.formats.column_words import ANGULAR
 from frf_ipz.ingest.formats.file_arrays import FileArrays, describe, last_part
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
-from frf_ipz.ingest.formats.frf_text import ANGULAR
 from frf_ipz.ingest.formats.recording_arrays import RATE
 from frf_ipz.ingest.formats.registry import find_array_format
 from frf_ipz.ingest.formats.testlab_arrays import points_of, testlab_blocks

@@ -11,6 +11,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, complex_array
 from frf_ipz.errors import FileFormatError, QuantityError, did_you_mean
+from frf_ipz.ingest.formats.column_words import ANGULAR, FREQUENCY, frf_role
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import COMMENT, NEWLINE, TextLayout, decode, name_and_unit, open_text, sniff
 from frf_ipz.ingest.formats.text_table import not_a_number, read_blocks, require_once
@@ -27,8 +28,7 @@ else:
     pa = import_late("pyarrow")
 
 SKIP = "skip"
-ANGULAR = re.compile(r"w|omega\w*|om|rad_?s|w_?(vec|axis)\w*", re.IGNORECASE)  # names of angular frequencies
-STATED = "frequency"  # in the unit that the header states
+STATED = FREQUENCY  # in the unit that the header states
 FREQUENCIES = ("frequency_hz", "frequency_rad_s", STATED)
 KNOWN = (
     *FREQUENCIES,
@@ -184,19 +184,25 @@ def unit_of_values(rows: Sequence[Sequence[str]], names: Sequence[str]) -> Heade
                 except QuantityError:
                     continue
                 return HeaderUnit(text=unit, quantity=quantity, is_reciprocal=is_reciprocal)
-    of_values = [row[index] for row in rows if len(row) == len(names) for index in _linear(names)]
-    return HeaderUnit(text=next((unit for field in of_values if (unit := _claimed_unit(field))), ""))
+    of_values = [_of_values(row, names) for row in rows if len(row) == len(names)]
+    claimed = (_claimed_unit(field, is_alone=len(set(row)) == 1) for row in of_values for field in row)
+    return HeaderUnit(text=next(filter(None, claimed), ""))
 
 
-def _linear(names: Sequence[str]) -> list[int]:
-    return [index for index, name in enumerate(names) if name in LINEAR]
+def _of_values(row: Sequence[str], names: Sequence[str]) -> list[str]:
+    return [field for field, name in zip(row, names, strict=True) if name in LINEAR and field]
 
 
-def _claimed_unit(field: str) -> str:
-    """Give what a field of a header claims to be a unit, in brackets or alone; empty where it is none."""
+def _claimed_unit(field: str, *, is_alone: bool) -> str:
+    """Give what a field of a header claims to be a unit, in brackets or alone; empty where it is none.
+
+    Alone stands a unit that all parts of a value share, and none has another: 'Re' and 'Im' are names.
+    """
     unit = name_and_unit(field)[1]
     if is_stated(unit) and ("/" in unit or is_unit(unit)):
         return unit
+    if not is_alone or frf_role(field):
+        return ""
     is_claimed = all(is_unit(part) or part.strip().lower() == ENGINEERING for part in field.split("/"))
     return field if is_claimed else ""
 

@@ -148,9 +148,10 @@ def _make_frf(source: FrfSource, function: UniversalFunction, coherence: Univers
     is_finite = np.isfinite(values)
     left_out = ~is_finite & (frequency_hz == 0.0)
     if not (is_finite | left_out).all():
-        hertz = frequency_hz[int(np.argmin(is_finite | left_out))]
+        place = int(np.argmin(is_finite | left_out))
+        hertz, line = frequency_hz[place], function.point_lines[order[place]]
         problem = f"the FRF {output_dof} / {input_dof} is not finite at {hertz:g} Hz; correct the file"
-        raise FileFormatError(source.path, problem, where=f"data set {function.number}, line {function.line}")
+        raise FileFormatError(source.path, problem, where=f"data set {function.number}, line {line}")
     notes = (*notes, *note_at_rest(source, output_dof, input_dof, left_out))
     known_coherence = None
     if coherence is not None and len(coherence.x) == len(function.x):

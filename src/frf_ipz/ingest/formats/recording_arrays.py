@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.errors import FileFormatError, errors_of_file
+from frf_ipz.ingest.formats.column_words import TIME
 from frf_ipz.ingest.formats.file_arrays import ArrayFormat, FileArrays, describe, last_part
 from frf_ipz.ingest.formats.registry import find_array_format
 from frf_ipz.ingest.formats.signal_table import Signal, SignalTable, describe_signals, even_times, open_signals
 from frf_ipz.ingest.formats.testlab_arrays import TestlabBlock, points_of, testlab_blocks
-from frf_ipz.ingest.formats.text_columns import TIME, TIME_UNIT
+from frf_ipz.ingest.formats.text_columns import TIME_UNIT
 from frf_ipz.ingest.formats.text_layout import read_head
 from frf_ipz.ingest.formats.time_stamps import resolution_of, unit_of_stamps
 from frf_ipz.ingest.units import unit_factor

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.errors import FileFormatError
+from frf_ipz.ingest.formats.column_words import TIME
 from frf_ipz.ingest.formats.recording import LARGEST, RawRecording, RecordingContents, SignalColumn
 from frf_ipz.ingest.formats.signal_table import SAME_CLOCK, SAME_RATE
 from frf_ipz.ingest.formats.text_columns import (
-    TIME,
     find_columns,
     no_time,
     printed_resolution,

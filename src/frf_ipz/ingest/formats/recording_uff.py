@@ -50,9 +50,10 @@ class _UniversalRecordings:
                 raise FileFormatError(path, problem, where=f"line {function.line}")
             is_finite = np.abs(function.values) < LARGEST
             if not is_finite.all():
-                sample = int(np.argmin(is_finite)) + 1
-                problem = f"sample {sample} of data set {function.number} is not finite, or absurdly large"
-                raise FileFormatError(path, f"{problem}; correct the file", where=f"line {function.line}")
+                place = int(np.argmin(is_finite))
+                problem = f"sample {place + 1} of data set {function.number} is not finite, or absurdly large"
+                line = function.point_lines[place]
+                raise FileFormatError(path, f"{problem}; correct the file", where=f"line {line}")
         table = np.column_stack([first.x, *(function.values.real for function in chosen)])
         return RawRecording(
             path=path,

@@ -12,11 +12,12 @@ import numpy as np
 from frf_ipz.dofs import as_dofs
 from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.ingest import formats
+from frf_ipz.ingest.formats.column_words import frf_role
 from frf_ipz.ingest.formats.file_arrays import ArrayFormat
 from frf_ipz.ingest.formats.frf_file import FrfFormat
 from frf_ipz.ingest.formats.modes_file import ModesFormat
 from frf_ipz.ingest.formats.recording import LARGEST, RecordingFormat, TableKeys
-from frf_ipz.ingest.formats.text_layout import read_head
+from frf_ipz.ingest.formats.text_layout import read_head, sniff
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.modes_file import ModesSource
     from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents
     from frf_ipz.modes import ModalParameters
+
+FEWEST_COLUMNS = 3  # frequency and two parts of a value
+LETTERS_SHOWN, NAMES_SHOWN = 40, 5  # of names of columns, in a message
 
 
 def open_recording(path: Path, columns: Sequence[str], keys: TableKeys | None = None) -> RawRecording:
@@ -85,8 +89,24 @@ def read_frf_file(source: FrfSource) -> tuple[MeasuredFrf, ...]:
                     as_dofs((frf.output_dof, frf.input_dof))
                 _require_sizes(frf)
             return frfs
-    raise FileFormatError(
-        source.path, "is of no known format for FRFs; export it as CSV, as text with 'columns', or as UFF 58"
+    problem = "is of no known format for FRFs; export it as CSV, as text with 'columns', or as UFF 58"
+    raise FileFormatError(source.path, problem + _columns_unknown(source.path))
+
+
+def _columns_unknown(path: Path) -> str:
+    """Say which names of columns do not tell what they are, where a file is a table of numbers."""
+    try:
+        layout = sniff(path)
+    except FileFormatError:
+        return ""
+    names = next((row for row in reversed(layout.header) if len(row) == layout.n_columns), ())
+    if not names or layout.n_columns < FEWEST_COLUMNS:
+        return ""
+    unknown = [name for name in names if not frf_role(name)]
+    shown = ", ".join(f"'{name[:LETTERS_SHOWN]}'" for name in (unknown or names)[:NAMES_SHOWN])
+    return (
+        f"; it is a table whose columns {shown} do not say what they are: write what all of them are, as in "
+        'columns = ["frequency_hz", "real", "imag"], in its [[frf]]'
     )
 
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.errors import FileFormatError, errors_of_file
-from frf_ipz.ingest.formats.text_layout import STAMP, is_number, is_stamp, name_and_unit
+from frf_ipz.ingest.formats.column_words import FREQUENCY, TIME, frf_role
+from frf_ipz.ingest.formats.text_layout import DELIMITERS, STAMP, is_number, is_stamp, name_and_unit, split_line
 from frf_ipz.ingest.formats.text_table import column_index
 from frf_ipz.ingest.formats.time_stamps import DAY_S, unit_of_stamps
 from frf_ipz.ingest.units import is_unit
@@ -30,22 +31,17 @@ OTHER_HEADER = "; where another line names the columns, write header_row = ... u
 EVEN = 0.02  # of the step between printed times: twice what the contract allows, since digits are rounded
 LETTERS_SHOWN, NAMES_SHOWN = 40, 10  # of names of columns, in a message
 FEWEST_ROWS = 3  # two steps can be compared
-TIME = re.compile(
-    r"^(elapsed|relative|abs(olute)?)?[ _]*(t|time|zeit|temps|tempo|tiempo|tid|tijd|x[ _-]?value|x[ _-]?axis|"
-    r"seconds?|secs?|timestamp|zeitstempel|date ?time|milliseconds?|microseconds?|millis|micros)(?![a-z])",
-    re.IGNORECASE,
-)
 TIME_UNIT = re.compile(
     r"(?:^|[ _/.,])(s|sec|secs|seconds?|ms|msec|millis|milliseconds?|us|µs|micros|microseconds?|ns|min|h|hours?|d|"
     r"days?)$",
     re.IGNORECASE,
 )
-FREQUENCY = re.compile(r"freq|frequenz|\bhz\b", re.IGNORECASE)
 PRINTED = re.compile(r"[-+]?[0-9]*(?:[.,]([0-9]*))?(?:[eEdD]([-+]?[0-9]{1,3}))?")
 ENCODINGS = (  # of names that are not in UTF-8, beside Latin-1: of Windows, of DOS, of Macs
     *("cp1252", "cp932", "gb18030", "cp950", "cp949", "euc_jp", "cp1250", "cp1251", "cp1253", "cp1254", "cp1255"),
     *("cp437", "cp850", "cp852", "cp866", "koi8_r", "mac_roman"),
 )
+NUMBER_WITH_UNIT = re.compile(r"([-+]?[0-9.,]+(?:[eE][-+]?[0-9]+)?) ?([^\W\d].*)")
 REMARK = re.compile(r"comments?|kommentare?|remarks?", re.IGNORECASE)
 
 
@@ -300,9 +296,23 @@ def _match_width(layout: TextLayout, fields: Sequence[str]) -> list[str] | None:
 
 
 def _wrong_width(layout: TextLayout, fields: Sequence[str]) -> FileFormatError:
+    cell = _cell_with_unit(" ".join(layout.rows[0]))
+    if cell:
+        problem = f"has units in its cells, as in '{cell}', where numbers alone are read: export it without them, and "
+        problem += "write the units behind the names in the header, as in 'force [N]'"
+        return FileFormatError(layout.path, problem, where=f"line {layout.n_before + 1}")
     problem = f"has {counted(layout.n_columns, 'value')} where the header has {counted(len(fields), 'column')}"
     hint = "; a decimal comma needs semicolons or tabs between the columns" if layout.delimiter == "," else ""
     return FileFormatError(layout.path, problem + hint + OTHER_HEADER, where=f"line {layout.n_before + 1}")
+
+
+def _cell_with_unit(line: str) -> str:
+    """Find a cell that holds a number and its unit behind it; empty where not all cells of a line are so."""
+    for delimiter in DELIMITERS[:-1]:
+        matches = [NUMBER_WITH_UNIT.fullmatch(cell) for cell in split_line(line, delimiter)]
+        if len(matches) > 1 and all(match and is_number(match[1]) and is_unit(match[2]) for match in matches):
+            return split_line(line, delimiter)[-1]
+    return ""
 
 
 def _find_time(
@@ -312,8 +322,11 @@ def _find_time(
     for index in free:
         if TIME.match(names[index]) and _is_time_unit(units[index]) and (index or not counts_samples):
             return index
+    for index in free:
+        if _holds_stamps(layout, index):
+            return index
     place = 1 if counts_samples else 0
-    if place not in free or FREQUENCY.search(names[place]) or not _is_time_unit(units[place]):
+    if place not in free or frf_role(names[place]) == FREQUENCY or not _is_time_unit(units[place]):
         return None
     return place if _grows(layout, place) and not _counts_samples(layout, names, units, place) else None
 
@@ -328,10 +341,13 @@ def _counts_samples(layout: TextLayout, names: Sequence[str], units: Sequence[st
     )
 
 
+def _holds_stamps(layout: TextLayout, index: int) -> bool:
+    """Tell a column of times of day, whatever it is called and whatever stands before it: dates, numbers of lines."""
+    return all(is_stamp(fields[index]) for fields in layout.rows if index < len(fields))
+
+
 def _grows(layout: TextLayout, index: int) -> bool:
     """Tell whether a column grows from row to row, by steps that are equal but for a few."""
-    if all(is_stamp(fields[index]) for fields in layout.rows if index < len(fields)):
-        return True
     steps = np.diff(_column(layout, index))
     if len(steps) < FEWEST_ROWS - 1 or not (steps > 0.0).all():
         return False

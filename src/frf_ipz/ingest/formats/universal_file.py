@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 
 END = b"-1"  # alone on its line: a data set begins or ends
 N_HEAD = 11  # lines of a data set 58 before its numbers
@@ -82,6 +82,8 @@ class UniversalFunction:
         Abscissae, as the file has them.
     values : (n_points,) complex array
         Ordinates.
+    point_lines : (n_points,) int array
+        Lines on which the numbers of the points begin; of binary numbers, where the data set does.
     units : pair of float, optional
         Factors of length and force from SI to the file's units, where a data set 164 states them.
     """
@@ -98,6 +100,7 @@ class UniversalFunction:
     denominator: Axis
     x: FloatArray
     values: ComplexArray
+    point_lines: IntArray
     units: tuple[float, float] | None
 
     @property
@@ -243,7 +246,8 @@ def _read_function(lines: _Lines, number: int, kind: str, units: tuple[float, fl
     parts, *_ = ORDINATES[ordinate_type]
     is_even = spacing != 0
     read = _read_binary if "b" in kind.lower() else _read_text
-    table = read(lines, kind, ordinate_type, is_even, n_points * (parts + (not is_even))).reshape(n_points, -1)
+    numbers, on_lines = read(lines, kind, ordinate_type, is_even, n_points * (parts + (not is_even)))
+    table = numbers.reshape(n_points, -1)
     x = start + step * np.arange(n_points) if is_even else table[:, 0]
     columns = table[:, -parts:]
     return UniversalFunction(
@@ -259,6 +263,7 @@ def _read_function(lines: _Lines, number: int, kind: str, units: tuple[float, fl
         denominator=denominator,
         x=np.asarray(x, np.float64),
         values=complex_array(columns[:, 0], columns[:, 1] if parts == 2 else 0.0),
+        point_lines=on_lines.reshape(n_points, -1)[:, 0] if len(on_lines) else np.full(n_points, first),
         units=units,
     )
 
@@ -314,8 +319,14 @@ def _read_axis(lines: _Lines) -> Axis:
     return Axis(data_type=data_type[0], label=line[26:46].strip(), unit=line[47:].strip())
 
 
-def _read_text(lines: _Lines, kind: str, ordinate_type: int, is_even: bool, count: int) -> FloatArray:  # noqa: FBT001
-    """Read numbers by the blanks between them, or by columns where they touch."""
+def _read_text(
+    lines: _Lines,
+    kind: str,
+    ordinate_type: int,
+    is_even: bool,  # noqa: FBT001
+    count: int,
+) -> tuple[FloatArray, IntArray]:
+    """Read numbers by the blanks between them, or by columns where they touch; and the line of each."""
     del kind
     widths = ORDINATES[ordinate_type][2] if is_even else ORDINATES[ordinate_type][3]
     first = lines.number + 1
@@ -336,7 +347,7 @@ def _read_text(lines: _Lines, kind: str, ordinate_type: int, is_even: bool, coun
             fault = fault or lines.fault(str(error), line)
             continue
         if n_tokens == count:
-            return values
+            return values, np.repeat(first + np.arange(len(rows)), [len(row) for row in tokens])
         problem = "the file is cut off" if is_cut and n_tokens < count else "the data set is damaged"
         wrong_count = lines.fault(
             f"holds {n_tokens} numbers where its head promises {count}: {problem}; export it again"
@@ -345,7 +356,13 @@ def _read_text(lines: _Lines, kind: str, ordinate_type: int, is_even: bool, coun
     raise fault or lines.fault("holds no numbers")
 
 
-def _read_binary(lines: _Lines, kind: str, ordinate_type: int, is_even: bool, count: int) -> FloatArray:  # noqa: FBT001
+def _read_binary(
+    lines: _Lines,
+    kind: str,
+    ordinate_type: int,
+    is_even: bool,  # noqa: FBT001
+    count: int,
+) -> tuple[FloatArray, IntArray]:
     tokens = _integers(kind.lower().partition("b")[2].split())
     if tokens is None or len(tokens) < 4:
         raise lines.fault(f"'{kind.strip()}' does not say how its binary numbers are written")
@@ -359,10 +376,11 @@ def _read_binary(lines: _Lines, kind: str, ordinate_type: int, is_even: bool, co
     data = lines.take_bytes(n_bytes)
     lines.skip_to_end_mark()
     if len(data) == count * size:
-        return np.frombuffer(data, values).astype(np.float64)
+        return np.frombuffer(data, values).astype(np.float64), np.zeros(0, np.int64)
     if not is_even and len(data) == count // (parts + 1) * mixed.itemsize:
         table = np.frombuffer(data, mixed)
-        return np.column_stack([table["x"], table["values"]]).astype(np.float64).ravel()
+        numbers = np.column_stack([table["x"], table["values"]]).astype(np.float64).ravel()
+        return numbers, np.zeros(0, np.int64)
     raise lines.fault(f"holds {len(data)} bytes where its head promises {count} numbers: it is cut off or damaged")
 
 

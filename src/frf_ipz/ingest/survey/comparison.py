@@ -391,9 +391,13 @@ def _difference(spectra: ImpactSpectra, comparison: OutputComparison, place: tup
     """Say by how much one response of an impact differs from what those of the others make of its force."""
     impact, output = place
     response, expected = spectra.responses[impact, output], comparison.frf * spectra.force[impact]
-    difference = np.abs(response - expected) / np.maximum(np.abs(expected), np.finfo(float).tiny)
-    usual = np.sqrt(comparison.scatter) / np.maximum(np.abs(expected), np.finfo(float).tiny)
-    return f"it is {100 * np.median(difference):.2g} % off (median), the others {100 * np.median(usual):.2g} %"
+    size = np.maximum(np.abs(expected), np.finfo(float).tiny)
+    difference = np.abs(response - expected) / size
+    usual = np.median(np.sqrt(comparison.scatter) / size)
+    return (
+        f"it is {100 * np.median(difference):.2g} % off what the other impacts make of its force (median over the "
+        f"lines, where noise and their own scatter are {100 * usual:.2g} %)"
+    )
 
 
 def _find_lost(

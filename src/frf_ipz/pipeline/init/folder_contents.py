@@ -29,7 +29,7 @@ UNTIMED = (
 BARE_FRF = ("frequency_hz", "real", "imag")  # columns of a table without names, as CutPro writes it
 FEWEST_ROWS = 16  # of a recording
 DOF_COLUMNS = frozenset({"node", "direction"})
-PLACE_COLUMNS = (frozenset({"node", "x", "y", "z"}), frozenset({"node", "x_m", "y_m", "z_m"}))
+PLACE_COLUMNS = re.compile(r"node( [xyz]([ _]*[\[(/]?[a-z]+[\])]?)?){3}")
 UNIVERSAL = (".unv", ".uff")
 KEPT_ASIDE = re.compile(r"reference|aside|poi([_-]|$)|truth|validation", re.IGNORECASE)
 
@@ -99,7 +99,7 @@ def look_into(folder: Path) -> FolderContents:
     dof_tables = [path for path in files if path.suffix.lower() == CSV and _columns(path) >= DOF_COLUMNS]
     modes = [path for path in files if path.suffix.lower() == CSV and _columns(path) >= MODES_COLUMNS]
     modes += [path for path in files if path.suffix.lower() in UNIVERSAL and holds_shapes(path)]
-    places = [path for path in files if path.suffix.lower() == CSV and _columns(path) in PLACE_COLUMNS]
+    places = [path for path in files if path.suffix.lower() == CSV and _holds_places(path)]
     models = find_models(files, dof_tables, places)
     of_models = {path for model in models for path in model.paths}
     jobs = {path.with_suffix("") for path in of_models}  # what a solver printed has the name of its deck
@@ -204,6 +204,10 @@ def _is_table(path: Path) -> bool:
 
 def _is_hidden(path: Path, folder: Path) -> bool:
     return any(part.startswith(".") for part in path.relative_to(folder).parts)
+
+
+def _holds_places(path: Path) -> bool:
+    return PLACE_COLUMNS.fullmatch(" ".join(sorted(_columns(path)))) is not None
 
 
 def _columns(path: Path) -> frozenset[str]:

@@ -310,6 +310,20 @@ def _values(text: _Text, values: ComplexArray | FloatArray, what: str) -> Comple
     return values
 
 
+def _about_skew(what: str, *, has_diagonal: bool) -> str:
+    """Say what is wrong with a matrix whose first line says that it is skew-symmetric."""
+    if what != "damping" or has_diagonal:
+        why = "its diagonal is not zero" if has_diagonal else f"no {what} is (gyroscopic forces belong to the damping)"
+        return (
+            f"says skew-symmetric in its first line, and {why}: where one triangle of a symmetric matrix stands there, "
+            "write symmetric in that line; else export it again"
+        )
+    return (
+        "is skew-symmetric, as gyroscopic (Coriolis) matrices of what rotates are; the method needs symmetric "
+        "matrices: measure the structure at rest, and leave the damping file out"
+    )
+
+
 def _assemble(
     text: _Text, what: str, rows: IntArray, columns: IntArray, values: ComplexArray | FloatArray
 ) -> StoredMatrix:
@@ -322,11 +336,7 @@ def _assemble(
     if text.format == "array":  # which has a number in every place
         matrix.eliminate_zeros()
     if text.symmetry == "skew-symmetric" and matrix.nnz:
-        raise FileFormatError(
-            text.path,
-            "is skew-symmetric, as gyroscopic (Coriolis) matrices of what rotates are; the method needs symmetric "
-            f"matrices: measure the structure at rest, and leave the {what} file out",
-        )
+        raise FileFormatError(text.path, _about_skew(what, has_diagonal=bool(matrix.diagonal().any())))
     upper, lower = sparse.csr_array(sparse.triu(matrix, 1)), sparse.csr_array(sparse.tril(matrix, -1).T)
     has_both = bool(upper.nnz and lower.nnz)
     if text.symmetry == "general":

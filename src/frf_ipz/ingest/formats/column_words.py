@@ -1,0 +1,83 @@
+"""Words that analysers write for columns, in English, German, French, Dutch, Italian and Spanish.
+
+The one answer to what a name means, so that no name is taken for a unit: 'Re' is the real part, not 1e27 electrons.
+Accented letters are found as they are, without their accents, and in an encoding that was not told: 'Réel' stands in
+files as 'Reel', or with one or two odd letters in the place of 'é'.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+FREQUENCY = "frequency"
+ACCENTED = {  # letters, and how they are written without accents
+    "ä": "ae|a",
+    "ö": "oe|o",
+    "ü": "ue|u",
+    "á": "a",
+    "é": "e",
+    "ë": "e",
+    "í": "i",
+    "ó": "o",
+    "ú": "u",
+}
+ODD = "[^ -~]{1,2}|[?]"  # what an accented letter becomes in another encoding
+
+
+def _spelled(words: str) -> re.Pattern[str]:
+    """Compile words, with each accented letter in all ways in which files write it."""
+    ways = {letter: f"(?:{bare}|{ODD})" for letter, bare in ACCENTED.items()}
+    return re.compile("".join(ways.get(letter, letter) for letter in words), re.IGNORECASE)
+
+
+ANGULAR = _spelled(
+    r"w|ω|omega\w*|om|rad_?s|w_?(vec|axis)\w*|(angular|circular) freq\w*|(kreis|winkel)freq\w*|hoekfreq\w*|"
+    r"pulsatie|pulsation|pulsazione|pulsación|fréquence angulaire|frecuencia angular|frequenza angolare"
+)
+MODULUS = "mag|amp|abs|modul|módul|betrag"
+ANGLE = "pha|fase|angle|ángul|angolo|winkel|hoek|déphasage|^arg|^phi|φ"
+ROLES = (  # of a column, by its name; the first that fits
+    (FREQUENCY, _spelled(r"fr(e|é)(q|c|k)|^f$|^f ?\[|(?<![a-z])k?hz(?![a-z])|^w ?\[|^w$|omega|^ω|^pulsa[ctz]i")),
+    ("coherence", _spelled("coh|kohä|coer|gamma|γ")),
+    ("imag", _spelled(r"imm?ag|(?<![a-z])im(?![a-z])")),
+    ("real", _spelled(r"real|réel|reëel|(?<![a-z])re(?![a-z])")),
+    ("phase_rad", _spelled(rf"({ANGLE}).*(?<![a-z])rad")),
+    ("phase_deg", _spelled(ANGLE)),
+    ("magnitude_db", _spelled(rf"({MODULUS}|mod|gain|pegel|verstärkung).*db|^db")),
+    ("magnitude", _spelled(rf"{MODULUS}|^mod$")),
+)
+DEGREES = _spelled(r"deg|degré|gradi(?!e)|grados|graden|°|º|[\[(/] ?(ø|¡)")  # ° of DOS, of Macs
+GRAD = re.compile(
+    r"(?<![a-z])grad(?![a-z])", re.IGNORECASE
+)  # degrees in German, a hundredth of a right angle elsewhere
+GERMAN = _spelled(r"frequenz(?!a)|betrag|winkel|kohärenz")
+TIME = _spelled(
+    r"^(elapsed|relative|abs(olute)?|verstrichene)?[ _]*"
+    r"(t|time|zeit|uhrzeit|messzeit|zeitpunkt|zeitstempel|temps|heure|horodatage|tempo|ora|orario|tiempo|hora|"
+    r"tid|tijd|tijdstip|tijdstempel|x[ _-]?value|x[ _-]?axis|x[ _-]?achse|seconds?|secs?|timestamp|date ?time|"
+    r"milliseconds?|microseconds?|millis|micros)(?![a-z])"
+)
+
+
+def frf_role(name: str) -> str:
+    """Say what a column of an FRF is by its name.
+
+    Parameters
+    ----------
+    name : str
+        As its header writes it.
+
+    Returns
+    -------
+    str
+        As `columns` of ``[[frf]]`` says it; `FREQUENCY` for a frequency in the unit that the header states; empty for a
+        name that says nothing.
+
+    Examples
+    --------
+    >>> [frf_role(name) for name in ("Re", "Imaginärteil", "Réel [m/s²/N]", "Betrag [dB]", "Fase", "V/V")]
+    ['real', 'imag', 'real', 'magnitude_db', 'phase_deg', '']
+    """
+    composed = unicodedata.normalize("NFC", name)
+    return next((role for role, pattern in ROLES if pattern.search(composed)), "")
