@@ -102,7 +102,9 @@ def test_a_row_of_units_below_short_names_is_taken(tmp_path, row):
 
 def test_names_that_say_nothing_are_named(tmp_path):
     frf_file(tmp_path, "Frequency;Y1;Y2", PARTS["cartesian"])
-    with pytest.raises(InputError, match=r"columns 'Y1', 'Y2' do not say what they are: write .*columns = "):
+    with pytest.raises(
+        InputError, match=r"columns 'Frequency', 'Y1', 'Y2' do not all say what they are: write .*columns = "
+    ):
         frf_values(tmp_path)
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from frf_ipz.dofs import as_dofs
 from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.ingest import formats
-from frf_ipz.ingest.formats.column_words import frf_role
 from frf_ipz.ingest.formats.file_arrays import ArrayFormat
 from frf_ipz.ingest.formats.frf_file import FrfFormat
 from frf_ipz.ingest.formats.modes_file import ModesFormat
@@ -94,7 +93,7 @@ def read_frf_file(source: FrfSource) -> tuple[MeasuredFrf, ...]:
 
 
 def _columns_unknown(path: Path) -> str:
-    """Say which names of columns do not tell what they are, where a file is a table of numbers."""
+    """Give the names of columns, which do not tell what they are, where a file is a table of numbers."""
     try:
         layout = sniff(path)
     except FileFormatError:
@@ -102,10 +101,9 @@ def _columns_unknown(path: Path) -> str:
     names = next((row for row in reversed(layout.header) if len(row) == layout.n_columns), ())
     if not names or layout.n_columns < FEWEST_COLUMNS:
         return ""
-    unknown = [name for name in names if not frf_role(name)]
-    shown = ", ".join(f"'{name[:LETTERS_SHOWN]}'" for name in (unknown or names)[:NAMES_SHOWN])
+    shown = ", ".join(f"'{name[:LETTERS_SHOWN]}'" for name in names[:NAMES_SHOWN])
     return (
-        f"; it is a table whose columns {shown} do not say what they are: write what all of them are, as in "
+        f"; it is a table whose columns {shown} do not all say what they are: write it, as in "
         'columns = ["frequency_hz", "real", "imag"], in its [[frf]]'
     )
 
