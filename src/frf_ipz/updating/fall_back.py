@@ -3,7 +3,9 @@
 An update moves poles and zeros to those that were measured. Where some are paired wrongly (many light local modes in
 few sensors), the FRFs in between move away from the measurement. So the median deviation of the measured FRFs, in dB,
 is compared before and after; the noise of the fitted FRFs is what it may grow by without meaning anything. A factor
-that all FRFs share is taken off: a level that is wrong, of units or of the mass, is no work of the update.
+that all FRFs share is taken off: a level that is wrong, of units or of the mass, is no work of the update. It is the
+same one before and after, so what amplitudes of modes differ by in level between the two is left on the one that is
+farther from the test's: an update that changes the level of FRFs that were right has bent shapes.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.structure import ReducedModel
+    from frf_ipz.updating.scale import MeasuredScale
 else:
     pd = import_late("pandas")
 
@@ -48,9 +51,10 @@ def keep_if_better(updated: UpdatedModel, fit: ModalFit) -> UpdatedModel:
     """
     if not fit.labels or updated.model is updated.nominal or not len(updated.after):
         return updated
+    models, scales = (updated.nominal, updated.model), (updated.nominal_scale, updated.scale)
     before_db, after_db = (
-        median_deviation_db(fit, model, np.abs(scale.gains(fit.labels)))
-        for model, scale in ((updated.nominal, updated.nominal_scale), (updated.model, updated.scale))
+        median_deviation_db(fit, model, np.abs(scale.gains(fit.labels)), level_db=level_db)
+        for model, scale, level_db in zip(models, scales, _changed_db(*scales), strict=True)
     )
     if not after_db > before_db + _noise_db(fit):
         return updated
@@ -71,7 +75,20 @@ def keep_if_better(updated: UpdatedModel, fit: ModalFit) -> UpdatedModel:
     )
 
 
-def median_deviation_db(fit: ModalFit, model: ReducedModel, gains: FloatArray | None = None) -> float:
+def _changed_db(nominal: MeasuredScale, updated: MeasuredScale) -> tuple[float, float]:
+    """Levels of the nominal and the updated model over that of the one that is nearer to the test, dB.
+
+    0 as far as they differ by no more than their deviation.
+    """
+    before, after = (-DB * float(np.log(scale.level)) for scale in (nominal, updated))
+    std = DB * float(np.hypot(nominal.level_std, updated.level_std))
+    change = float(np.copysign(max(abs(after - before) - std, 0.0), after - before))
+    return (-change, 0.0) if abs(before) > abs(after) else (0.0, change)
+
+
+def median_deviation_db(
+    fit: ModalFit, model: ReducedModel, gains: FloatArray | None = None, *, level_db: float = 0.0
+) -> float:
     """Tell how far a model is from the measured FRFs.
 
     Parameters
@@ -82,6 +99,8 @@ def median_deviation_db(fit: ModalFit, model: ReducedModel, gains: FloatArray | 
         The model.
     gains : (n_frfs,) array, optional
         Of the measured FRFs over it; 1 where they are left out.
+    level_db : float
+        Of the model, dB, that is none of the factor that all FRFs share.
 
     Returns
     -------
@@ -93,7 +112,7 @@ def median_deviation_db(fit: ModalFit, model: ReducedModel, gains: FloatArray | 
         return 0.0
     values = np.abs(compute_frfs(model, fit.labels, s) * (1.0 if gains is None else gains))[is_heard]
     off_db = DB * np.log(np.maximum(values, np.finfo(float).tiny) / measured[is_heard])
-    return float(np.median(np.abs(off_db - np.median(off_db))))
+    return float(np.median(np.abs(off_db - np.median(off_db) + level_db)))
 
 
 def _heard(fit: ModalFit) -> tuple[ComplexArray, FloatArray, BoolArray]:

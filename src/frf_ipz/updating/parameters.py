@@ -40,6 +40,7 @@ GENERIC_STD = 0.005  # of a relative change that no part expresses, beside parts
 GENERIC_STD_ALONE = 0.05  # of the same where the model has no parts
 SENSOR_KG = 2e-3  # of the mass of a sensor that the model does not contain: accelerometers weigh some grams
 MASS_STD = 0.02  # masses are known better than stiffness
+LOCAL_MASS_STD = MASS_STD / GLOBAL_STD * SEGMENT_STD * len(SEGMENT_LENGTHS) ** 0.5  # at one place, beside the mean
 SCALE_UNCERTAINTY = 1.0  # standard deviation of the logarithm of each of these: the data may ask for others
 SAME_POSITION = 1e-9  # of the variance, by which two parts at one position differ, so that it has a root
 FREE_MODES = 24  # a change among higher modes hardly moves what was measured, where the band holds fewer

@@ -8,8 +8,13 @@ proportion to the mean amplitude of the FRF, whose size follows from the scatter
 
 Where the scale is known, the gain common to all FRFs is fitted all the same: it shows by how much the mass of the model
 is in doubt, which poles and zeros do not tell. The model stays as it is (a slip in the units of the test looks alike).
-Nothing tells which of the two is wrong, so every other member of the ensemble takes the gain that was found for that of
-the structure: bands reach from the model to it, and hold the truth either way.
+As many members of the ensemble as `mass_evidence` finds probable take the gain that was found for that of the
+structure: bands reach from the model to it, and hold the truth either way.
+
+Masses differ along a structure too, which poles and zeros hardly tell beside stiffness. The squares of the amplitudes
+of all modes at a point add up to 1 over the mass that moves there, so that members have amplitudes of their own at
+every node, by half of what masses are off; they shift the gains that are found at measured ones. Where the scale is
+unknown, what is predicted is in the unit of fitted gains, and masses are taken as they are.
 
 ``common``: one factor for all FRFs. ``per_channel``: one for every sensor and one for every excitation. Only products
 of the two show, so the sensors' are 1 in the geometric mean: a point without a sensor is seen by such a mean one.
@@ -26,10 +31,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray
+from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel
 from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.pencils import modes_of_stack
 from frf_ipz.pairing.poles import AMPLITUDE_STD, measured_amplitudes
+from frf_ipz.updating.mass_evidence import probability_of_mass
+from frf_ipz.updating.parameters import LOCAL_MASS_STD
 from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
@@ -47,6 +55,7 @@ else:
 SEED = 0  # of the draws: the same bands from the same inputs
 DRAWS = 200  # without an ensemble
 DECIBEL = 20 / np.log(10.0)
+HALF_OF_MASS = 0.5  # of its logarithm: squares of amplitudes go with the inverse of a mass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -69,6 +78,13 @@ class MeasuredScale:
         Measured FRFs over those of the model in their unit, where the test knows its scale; else 1.
     believes : (m,) bool array
         Which members take `level` for a property of the structure, the others for a slip of the test.
+    probability_of_mass : float
+        That `level` is a property of the structure.
+    local_std : float
+        Standard deviation of the logarithm of a mode's amplitude at a node, by the mass there; 0 where measured shapes
+        tell amplitudes.
+    member : int
+        Which member of the ensemble the gains are those of; -1 for the fitted ones.
 
     Examples
     --------
@@ -99,6 +115,9 @@ class MeasuredScale:
     draws: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     level: float = 1.0
     believes: BoolArray = field(default_factory=lambda: np.zeros(0, bool))
+    probability_of_mass: float = 0.5
+    local_std: float = 0.0
+    member: int = -1
 
     def __repr__(self) -> str:
         return f"MeasuredScale: {self.kind}, {counted(len(self.labels), 'FRF')}, {len(self.draws)} draws"
@@ -126,7 +145,7 @@ class MeasuredScale:
         float
             FRF in the unit of the measurement over that in the unit of the model.
         """
-        return self._product(self._places(label))
+        return self._product(self._places(label)) * self._of_member(label.output_dof, label.input_dof)
 
     def gains(self, labels: tuple[FrfLabel, ...]) -> FloatArray:
         """Give the gains of several FRFs.
@@ -174,7 +193,7 @@ class MeasuredScale:
         float
             1 without a sensor there, and where one gain is common to all.
         """
-        return self._product(self._sensor(dof, ""))
+        return self._product(self._sensor(dof, "")) * self._of_member(dof)
 
     def input_gain(self, dof: AnyDof) -> float:
         """Give the gain of an excitation.
@@ -189,7 +208,7 @@ class MeasuredScale:
         float
             With that which is common to all.
         """
-        return self._product(self._excitation(dof, ""))
+        return self._product(self._excitation(dof, "")) * self._of_member(dof)
 
     def drawn(self, label: FrfLabel, count: int) -> FloatArray:
         """Draw the gain of an FRF, over `gain`.
@@ -227,7 +246,8 @@ class MeasuredScale:
         if not places:
             return np.ones(count)
         deviation = (self.draws[:, places] - self.log_gain[places]).sum(axis=1)
-        return np.asarray(np.exp(np.resize(deviation, count)))
+        local = sum(self.local_std * local_errors(dof, len(deviation)) for dof in (label.output_dof, label.input_dof))
+        return np.asarray(np.exp(np.resize(deviation + local, count)))
 
     def members(self, count: int) -> list[MeasuredScale]:
         """Give the gains of the first members of the ensemble.
@@ -245,7 +265,7 @@ class MeasuredScale:
         if not self.is_fitted:
             return [self] * count
         gains = self.draws[:count] + self._believed(count)[:, None]
-        return [replace(self, log_gain=log_gain) for log_gain in gains]
+        return [replace(self, log_gain=log_gain, member=member) for member, log_gain in enumerate(gains)]
 
     def std_db(self, label: FrfLabel) -> float:
         """Give the standard deviation of the gain of an FRF.
@@ -296,6 +316,13 @@ class MeasuredScale:
             return np.zeros(count)
         return np.resize(np.where(self.believes, np.log(self.level), 0.0), count)
 
+    def _of_member(self, *dofs: AnyDof) -> float:
+        """Give the factor on amplitudes at DOFs that a member has by the masses there; 1 for the fitted gains."""
+        if self.member < 0 or not self.is_fitted:
+            return 1.0
+        errors = [local_errors(dof, len(self.draws))[self.member] for dof in dofs]
+        return float(np.exp(self.local_std * np.sum(errors)))
+
     def _product(self, places: list[int]) -> float:
         return float(np.prod(self.sign[places]) * np.exp(self.log_gain[places].sum()))
 
@@ -333,8 +360,34 @@ def _excitation_name(label: FrfLabel) -> str:
     return label.input_channel or label.input_dof.name
 
 
+def local_errors(dof: AnyDof, count: int) -> FloatArray:
+    """Draw errors of amplitudes at a node, the same ones at each call.
+
+    Parameters
+    ----------
+    dof : Dof or PortDof
+        Where: all directions of a node have the same mass.
+    count : int
+        Number of members.
+
+    Returns
+    -------
+    (count,) array
+        Standard normal.
+    """
+    place = str(dof.node) if isinstance(dof, Dof) else dof.unsigned.name
+    return np.random.default_rng([SEED, *place.encode()]).standard_normal(count)
+
+
 def fit_scale(
-    fit: ModalFit, pairs: Pairs, model: ReducedModel, roots: ComplexArray, ensemble: FloatArray
+    fit: ModalFit,
+    pairs: Pairs,
+    model: ReducedModel,
+    roots: ComplexArray,
+    ensemble: FloatArray,
+    *,
+    frequency: tuple[float, float] = (0.0, np.inf),
+    local_std: float = HALF_OF_MASS * LOCAL_MASS_STD,
 ) -> MeasuredScale:
     """Fit the gains of the measured FRFs over a model.
 
@@ -350,6 +403,11 @@ def fit_scale(
         Poles and zeros of that model in the order of `Pairs.targets`, rad/s.
     ensemble : (m, 3, r, r) array
         Mass, damping and stiffness of models drawn from what the targets leave open; may be empty.
+    frequency : (log_factor, std)
+        Of squared frequencies of the nominal model, as `frequency_factor` gives them.
+    local_std : float
+        Standard deviation of the logarithm of a mode's amplitude at a node, by the mass there, where the scale is
+        known.
 
     Returns
     -------
@@ -359,6 +417,8 @@ def fit_scale(
     poles = [place for place, pair in enumerate(pairs.targets) if pair.kind == "pole"]
     if not poles or not fit.labels:  # shapes without FRFs say nothing of a gain
         return MeasuredScale(kind=fit.unknown_scale)
+    if fit.unknown_scale != "none":
+        local_std = 0.0
     modes = np.array([pairs.targets[place].measured for place in poles])
     known = fit.gain if fit.unknown_scale == "none" else 1.0
     measured, noise = (values[modes] / np.abs(known) for values in measured_amplitudes(fit))
@@ -368,15 +428,24 @@ def fit_scale(
     measured, computed, spread = (together @ values for values in (measured, computed, spread))
     noise = np.sqrt(together @ noise**2)
     channels = _channels(fit.labels, fit.unknown_scale)
-    log_gain, draws = _fit_logs(measured, noise, computed, spread, channels, _independent(fit.labels))
+    local = [
+        local_errors(label.output_dof, len(ensemble) or DRAWS) + local_errors(label.input_dof, len(ensemble) or DRAWS)
+        for label in fit.labels
+    ]
+    log_gain, draws = _fit_logs(
+        measured, noise, computed, spread, channels, _independent(fit.labels), local_std * np.stack(local, axis=1)
+    )
     if fit.unknown_scale == "none":
+        share = probability_of_mass(float(log_gain[0]), float(np.std(draws)), *frequency)
         return MeasuredScale(
             labels=fit.labels,
             log_gain=np.zeros(1),
             sign=np.ones(1),
             draws=draws - log_gain,
             level=float(np.exp(log_gain[0])),
-            believes=np.random.default_rng(SEED + 1).permutation(np.arange(len(draws)) % 2 == 1),
+            believes=np.random.default_rng(SEED + 1).permutation(np.arange(len(draws)) < round(share * len(draws))),
+            probability_of_mass=share,
+            local_std=local_std,
         )
     sign = _signs(np.sum((measured * computed).real / np.abs(computed).max(axis=0), axis=0), channels)
     log_gain, draws = _balanced(log_gain, draws, fit.labels, fit.unknown_scale)
@@ -421,8 +490,9 @@ def _fit_logs(
     members: FloatArray,
     channels: FloatArray,
     n_independent: int,
+    local: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Logarithms of the gains, (n_gains,), and draws of them, (m, n_gains)."""
+    """Logarithms of the gains, (n_gains,), and draws of them, (m, n_gains), beside errors at points, (m, n_frfs)."""
     tiny = np.finfo(float).tiny
     n_modes, n_frfs = measured.shape
     log_computed = np.log(np.maximum(np.abs(computed), tiny))
@@ -444,6 +514,7 @@ def _fit_logs(
     student = np.sqrt(degrees / rng.chisquare(degrees, count))[:, None] if is_known else 1.0
     errors = rng.standard_normal((count, len(data))) * noise_part
     errors += rng.standard_normal((count, len(data))) * np.sqrt(excess * relative * n_frfs / n_independent) * student
+    errors -= np.tile(local, (1, n_modes))
     if len(members):
         errors -= of_members
     log_gain = gain_of @ data

@@ -23,6 +23,7 @@ from frf_ipz.progress import silent
 from frf_ipz.structure import ReducedModel, StructuralModel
 from frf_ipz.updating import methods
 from frf_ipz.updating.fall_back import keep_if_better
+from frf_ipz.updating.mass_evidence import frequency_factor
 from frf_ipz.updating.options import UpdateOptions
 from frf_ipz.updating.pairing_again import PairingAgain
 from frf_ipz.updating.parameters import ParameterBasis, make_structural_basis
@@ -180,12 +181,12 @@ def _meets(label: FrfLabel, points: Collection[AnyDof]) -> bool:
 
 
 def _with_scales(updated: UpdatedModel, fit: ModalFit, paired: Pairs) -> UpdatedModel:
+    frequency = frequency_factor(paired, updated.before)
+    none = np.zeros((0, *updated.ensemble.shape[1:]))
     return replace(
         updated,
-        scale=fit_scale(fit, paired, updated.model, updated.after, updated.ensemble),
-        nominal_scale=fit_scale(
-            fit, paired, updated.nominal, updated.before, np.zeros((0, *updated.ensemble.shape[1:]))
-        ),
+        scale=fit_scale(fit, paired, updated.model, updated.after, updated.ensemble, frequency=frequency),
+        nominal_scale=fit_scale(fit, paired, updated.nominal, updated.before, none, frequency=frequency),
     )
 
 

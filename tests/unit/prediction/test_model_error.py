@@ -7,7 +7,6 @@ import pytest
 
 import frf_ipz
 from clamped_beam import BEAM
-from frf_ipz.updating.scale import MeasuredScale
 
 LINES = np.arange(5.0, 700.0, 0.5)
 OUTPUTS, INPUTS, POINT = ("9:+z", "16:+z", "21:+z"), ("12:+z",), "18:+z"
@@ -37,7 +36,7 @@ def predict(machine, *, seed=0):
     matrices = frf_ipz.UpdateOptions(expand=False)  # measured shapes meet measured points by construction
     updated = frf_ipz.update_model(fit, reduced, fe_model=model, options=matrices)
     prediction = frf_ipz.predict_frfs(fit, updated, points=[POINT])
-    sure_of_mass = replace(updated, scale=MeasuredScale())
+    sure_of_mass = replace(updated, scale=replace(updated.scale, level=1.0))
     by_ensemble = frf_ipz.predict_frfs(frfs, sure_of_mass, points=[POINT], frequency_hz=prediction.frequency_hz)
     truth = frf_ipz.compute_frfs(machine, labels([POINT]), 2j * np.pi * prediction.frequency_hz)
     return prediction, by_ensemble, np.abs(truth)
@@ -66,7 +65,7 @@ def lacking():
 def test_a_model_that_can_express_the_measurement_keeps_a_narrow_band(sound):
     prediction, by_ensemble, truth = sound
     assert share_inside(prediction, truth) > 0.75
-    assert half_width_db(prediction) < 0.05
+    assert half_width_db(prediction) < 0.12  # masses leave 0.7 % of an amplitude open at each point: 0.1 dB
     assert half_width_db(prediction) < 1.2 * half_width_db(by_ensemble)
 
 

@@ -70,3 +70,25 @@ def test_what_the_noise_hides_is_no_reason(case):
     slightly = replace(updated, model=stiffer(updated.nominal, 1.01))
     assert keep_if_better(slightly, fit) is not slightly
     assert keep_if_better(slightly, noisy) is slightly
+
+
+def heavier(model, factor):
+    return replace(model, mass=factor * model.mass, damping=factor * model.damping, stiffness=factor * model.stiffness)
+
+
+def test_an_update_that_moves_the_level_of_frfs_that_were_right_is_not_kept(case):
+    fit, updated = case
+    bent = replace(updated, model=heavier(updated.nominal, 1.08), scale=replace(updated.scale, level=1.08))
+    kept = keep_if_better(bent, fit)
+    assert kept.model is updated.nominal
+    assert "dB off the measured FRFs (median), without it" in kept.warnings[-1]
+
+
+def test_a_level_that_both_have_wrong_is_no_work_of_the_update(case):
+    fit, updated = case
+    louder = replace(fit, model=replace(fit.model, residues=1.5 * fit.model.residues))
+    scale = replace(updated.scale, level=1.5)
+    better = replace(updated, nominal=stiffer(updated.nominal, 1.1), scale=scale, nominal_scale=scale)
+    assert keep_if_better(better, louder) is better
+    heavy = replace(updated, nominal=heavier(updated.nominal, 1.08), nominal_scale=replace(scale, level=1.08))
+    assert keep_if_better(heavy, fit) is heavy

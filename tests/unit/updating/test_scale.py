@@ -8,7 +8,8 @@ import pytest
 import frf_ipz
 from clamped_beam import BEAM
 from frf_ipz.export.state_space import make_state_space, make_state_space_ensemble, to_control
-from frf_ipz.updating.scale import MeasuredScale, fit_scale
+from frf_ipz.updating.parameters import LOCAL_MASS_STD
+from frf_ipz.updating.scale import MeasuredScale, fit_scale, local_errors
 from frf_testbench.updating.random_structures import draw_stiffness_errors, scale_stiffness
 from frf_testbench.updating.synthetic_fit import make_modal_fit, pair_in_order
 
@@ -149,6 +150,35 @@ def test_a_known_scale_has_gains_of_one_and_tells_how_far_the_mass_is_in_doubt(c
     np.testing.assert_allclose(gains, scale.drawn(label, 20))
 
 
+def test_masses_at_points_that_were_not_measured_are_open_and_those_at_measured_ones_shift_the_level(common):
+    known, label = replace(common.fit, unknown_scale="none"), common.fit.labels[0]
+    elsewhere = frf_ipz.FrfLabel(common.point, label.input_dof, "accelerance")
+    none = np.zeros((0, 3, *common.updated.model.mass.shape))
+    scale = fit_scale(known, common.pairs, common.updated.model, common.updated.after, none)
+    errors = np.log(scale.drawn_about_level(elsewhere, 200))
+    shares = (
+        1 + 1 / N_OUTPUTS + (1 - 1 / N_INPUTS)
+    )  # of the point, of the mean sensor, of the input beside the mean one
+    assert np.std(errors) == pytest.approx(LOCAL_MASS_STD / 2 * np.sqrt(shares), rel=0.25)
+    sure = fit_scale(known, common.pairs, common.updated.model, common.updated.after, none, local_std=0.0)
+    assert np.std(np.log(sure.drawn_about_level(elsewhere, 200))) < LOCAL_MASS_STD / 4
+    np.testing.assert_array_equal(local_errors(frf_ipz.Dof(3, "z"), 5), local_errors(frf_ipz.Dof(3, "x", -1), 5))
+
+
+def test_members_that_believe_the_structure_are_as_many_as_is_probable(common):
+    residues = common.fit.model.residues / common.gains[0] * 1.2
+    known = replace(common.fit, unknown_scale="none", model=replace(common.fit.model, residues=residues))
+    updated = common.updated
+    by_mass, by_test = (
+        fit_scale(known, common.pairs, updated.model, updated.after, updated.ensemble, frequency=(factor, 0.01))
+        for factor in (np.log(1.2), 0.0)
+    )
+    for scale in (by_mass, by_test):
+        assert np.mean(scale.believes) == pytest.approx(scale.probability_of_mass, abs=0.005)
+    assert by_mass.probability_of_mass > 0.75
+    assert by_test.probability_of_mass < 0.4
+
+
 def test_a_mode_that_an_frf_does_not_see_tells_nothing_of_the_gain(common):
     residues = common.fit.model.residues.copy()
     residues[0, 0] *= 1e-14  # far below its noise
@@ -185,11 +215,12 @@ def test_the_state_space_gives_frfs_as_measured_and_predicted(campaign, request)
 
 def test_members_of_the_state_space_have_their_own_gains(common):
     members = make_state_space_ensemble(common.fit, common.updated, options=frf_ipz.ExportOptions(ensemble=2))
+    scales = common.updated.scale.members(2)
     for number, space in enumerate(members):
         mass, damping, stiffness = common.updated.ensemble[number]
         model = replace(common.updated.model, mass=mass, damping=damping, stiffness=stiffness)
         lines = LINES[::100]
-        expected = common.frfs_of(model, common.outputs, lines) * np.exp(common.updated.scale.draws[number])
+        expected = common.frfs_of(model, common.outputs, lines) * scales[number].gains(common.fit.labels)
         values = to_control(space)(2j * np.pi * lines, squeeze=False).reshape(-1, len(lines)).T
         np.testing.assert_allclose(values, expected, rtol=1e-6)
 

@@ -10,6 +10,7 @@ import numpy as np
 from frf_ipz.assessment.assessment import Check, Verdict
 from frf_ipz.assessment.checks.agreement import NORMAL_90
 from frf_ipz.control_margins import GAIN_MARGIN_DB, SIXTH
+from frf_ipz.updating.mass_evidence import frequency_factor
 from frf_ipz.updating.parameters import MASS_STD
 
 if TYPE_CHECKING:
@@ -195,7 +196,8 @@ def scale(evidence: Evidence) -> Iterator[Check]:
 def level(evidence: Evidence) -> Iterator[Check]:
     """Say where measured amplitudes are off those of the model, all by one factor: its mass is in doubt.
 
-    Poles and zeros do not tell a mass. A unit or sensitivity of the test that is wrong looks alike.
+    A unit or sensitivity of the test that is wrong looks alike, but for the frequencies, which a mass moves too. Where
+    they are off by that factor alike, two measurements agree, and less is believed.
 
     Parameters
     ----------
@@ -210,23 +212,34 @@ def level(evidence: Evidence) -> Iterator[Check]:
     updated = evidence.updated_model
     is_updated = updated.expansion is None  # measured shapes have the measured amplitudes
     fitted = updated.scale if is_updated else updated.nominal_scale
-    doubt = float(np.log(fitted.level))
     if fitted.is_relative:
         return
-    limit = NO_CHANCE * float(np.hypot(fitted.level_std, MASS_STD))
+    doubt = float(np.log(fitted.level))
+    log_factor, factor_std = frequency_factor(updated.pairs or evidence.pairs, updated.before)
+    is_told = abs(log_factor) > NO_CHANCE * factor_std
+    is_told &= abs(log_factor - doubt) < NORMAL_90 * float(np.hypot(fitted.level_std, factor_std))
+    limit = (NORMAL_90 if is_told else NO_CHANCE) * float(np.hypot(fitted.level_std, MASS_STD))
     if abs(doubt) <= limit:
         return
     low, high = (np.exp(doubt + side * NORMAL_90 * fitted.level_std) for side in (-1, 1))
-    mass = f"{100 * abs(np.expm1(-doubt)):.2g} % {'heavier' if doubt < 0 else 'lighter'}"
+    off, *ends = (100 * abs(float(np.expm1(value))) for value in (doubt, np.log(low), np.log(high)))
+    model = f"the model is {off:.2g} % {'heavier' if doubt > 0 else 'lighter'} than the machine"
+    interval = f"(90 %: {min(ends):.2g} to {max(ends):.2g} %)"
+    test = f"a unit or sensitivity of the test is off (probability of the mass: {fitted.probability_of_mass:.2g})"
+    higher = f"{abs(100 * float(np.expm1(log_factor / 2))):.2g} % {'higher' if log_factor > 0 else 'lower'}"
+    what = f"either {model} {interval} in these modes, or {test}"
+    if is_told:
+        what = (
+            f"{model} {interval}, as frequencies tell too, which are all {higher}; else its stiffness is off and {test}"
+        )
     yield Check(
         name="mass of the model",
         verdict=Verdict.WITH_CARE,
         figure=abs(doubt),
         limit=limit,
         unit="1",
-        says=f"measured amplitudes of modes are {fitted.level:.3g} times those of the model (90 %: {low:.3g} to "
-        f"{high:.3g}): either the structure is {mass} than its model in these modes, or a unit or sensitivity of "
-        f"the test is off; {'bands reach from one to the other' if is_updated else 'the prediction goes by the test'}",
+        says=f"measured amplitudes of modes are {fitted.level:.3g} times those of the model ({low:.3g} to {high:.3g}): "
+        f"{what}; {'bands reach from one to the other' if is_updated else 'the prediction goes by the test'}",
         advice="weigh the structure and compare with its model; look at the sensitivities of force and responses",
     )
 

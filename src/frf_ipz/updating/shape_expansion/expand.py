@@ -134,7 +134,9 @@ def with_expanded_shapes(
         ensemble=ensemble,
         unmet=(),
         parts=pd.DataFrame(),
-        scale=fit_scale(corrected, _pairs_of_measured_modes(fit), model, fit.model.poles[: fit.n_modes], ensemble),
+        scale=fit_scale(
+            corrected, _pairs_of_measured_modes(fit), model, fit.model.poles[: fit.n_modes], ensemble, local_std=0.0
+        ),
         expansion=expansion,
     )
 
