@@ -13,7 +13,8 @@ structure: bands reach from the model to it, and hold the truth either way.
 
 Masses differ along a structure too, which poles and zeros hardly tell beside stiffness. The squares of the amplitudes
 of all modes at a point add up to 1 over the mass that moves there, so that members have amplitudes of their own at
-every node, by half of what masses are off; they shift the gains that are found at measured ones.
+every node, by half of what masses are off; they shift the gains that are found at measured ones. Where the scale is
+unknown, what is predicted is in the unit of fitted gains, and masses are taken as they are.
 
 ``common``: one factor for all FRFs. ``per_channel``: one for every sensor and one for every excitation. Only products
 of the two show, so the sensors' are 1 in the geometric mean: a point without a sensor is seen by such a mean one.
@@ -405,7 +406,8 @@ def fit_scale(
     frequency : (log_factor, std)
         Of squared frequencies of the nominal model, as `frequency_factor` gives them.
     local_std : float
-        Standard deviation of the logarithm of a mode's amplitude at a node, by the mass there.
+        Standard deviation of the logarithm of a mode's amplitude at a node, by the mass there, where the scale is
+        known.
 
     Returns
     -------
@@ -415,6 +417,8 @@ def fit_scale(
     poles = [place for place, pair in enumerate(pairs.targets) if pair.kind == "pole"]
     if not poles or not fit.labels:  # shapes without FRFs say nothing of a gain
         return MeasuredScale(kind=fit.unknown_scale)
+    if fit.unknown_scale != "none":
+        local_std = 0.0
     modes = np.array([pairs.targets[place].measured for place in poles])
     known = fit.gain if fit.unknown_scale == "none" else 1.0
     measured, noise = (values[modes] / np.abs(known) for values in measured_amplitudes(fit))
@@ -445,9 +449,7 @@ def fit_scale(
         )
     sign = _signs(np.sum((measured * computed).real / np.abs(computed).max(axis=0), axis=0), channels)
     log_gain, draws = _balanced(log_gain, draws, fit.labels, fit.unknown_scale)
-    return MeasuredScale(
-        kind=fit.unknown_scale, labels=fit.labels, log_gain=log_gain, sign=sign, draws=draws, local_std=local_std
-    )
+    return MeasuredScale(kind=fit.unknown_scale, labels=fit.labels, log_gain=log_gain, sign=sign, draws=draws)
 
 
 def _channels(labels: tuple[FrfLabel, ...], kind: str) -> FloatArray:
