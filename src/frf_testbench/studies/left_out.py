@@ -3,7 +3,7 @@
 ``frf-testbench study left_out FOLDER`` leaves out each sensor of the steel beam in turn, or each struck point of the
 free beam: its FRFs are kept from the fit and the update, and predicted. Errors stand in dB as predicted, and after one
 factor, the median of the ratios of all that was left out: the scale of a channel is rarely known.
-`pipelines/left_out.py` does so with any test.
+`pipelines/left_out.py` does the same with any test.
 """
 
 from __future__ import annotations
