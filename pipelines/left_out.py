@@ -57,11 +57,9 @@ def leave_out(
     predicted = updated.compute_frfs(left_out.labels, left_out.s)
     nominal = frf_ipz.compute_frfs(frf_ipz.shift_to_measured_poles(pairs, reduced_model), left_out.labels, left_out.s)
     low, high = frf_ipz.band_of_magnitudes(fit, updated, labels=left_out.labels, s=left_out.s)
-    as_predicted, after_factor = differences_db(left_out.values, predicted)
     return {
         "nominal shapes, dB after a factor": differences_db(left_out.values, nominal)[1],
-        "dB": as_predicted,
-        "dB after a factor": after_factor,
+        **dict(zip(("dB", "dB after a factor"), differences_db(left_out.values, predicted), strict=True)),
         "in the band": share_in_band(left_out, np.abs(predicted), low, high),
         "band, +- dB": float(np.median(10 * np.log10(high / low))),
     }
