@@ -106,9 +106,14 @@ def _step_to_rivals(
         beside = []
         for location in component.effect.neighbours(problem.context, component.location):
             moved = replace(component, location=location)
+            if moved.key in fits or not worth_fitting(moved):
+                continue
             hypothesis = problem.make_hypothesis((*base.hypothesis.components, moved))
-            is_open = moved.key not in fits and worth_fitting(moved)
-            if is_open and not is_hopeless(problem, best, hypothesis, (fit.values,)):
+            starts = [fit.values]
+            if _names(hypothesis) != _names(fit.hypothesis):  # as at an end, and at a node beside it
+                grid = _thin_grid(component.effect.start_values(problem.context, location))
+                starts = [np.concatenate([base.values, values]) for values in grid]
+            if not is_hopeless(problem, best, hypothesis, starts):
                 beside.append(location)
         better = _best_of_locations(problem, base, fit, beside, fits)
         if better is fit:

@@ -200,6 +200,20 @@ def test_a_place_between_those_that_were_fitted_is_reached_beside_one_that_expla
     assert likeliest(fits.values()).hypothesis.components[-1].key == component_at(problem, names[0], 12).key
 
 
+def test_neighbours_with_fewer_parameters_are_rivals_with_values_of_their_own(nominal):
+    """A support that may be compliant in rotation, in translation, or in both, beside a spring that explains all."""
+    names = ("grounded_spring", "boundary_compliance")
+    problem = problem_with(nominal, names, [("grounded_spring", 12)], [2e3])
+    base = fit_null_model(problem)
+    spring = problem.fit((component_at(problem, names[0], 12),), np.array([2e3]))
+    support = problem.effects[names[1]]
+    both = next(place for place in support.locations(problem.context) if len(place.directions) == 2)
+    component = Component(effect=support, location=both, n_locations=3)
+    fit = problem.fit((component,), support.start_values(problem.context, both)[0])
+    fits = {one.hypothesis.components[-1].key: one for one in (spring, fit)}
+    assert climb._step_to_rivals(problem, base, fit, spring, fits, lambda _: True).log_evidence < spring.log_evidence
+
+
 def test_of_several_starts_the_data_choose(nominal):
     problem = problem_with(nominal, ("grounded_spring",), [("grounded_spring", 12)], [2e3])
     hypothesis = problem.make_hypothesis((component_at(problem, "grounded_spring", 12),))
