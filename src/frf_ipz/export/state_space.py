@@ -38,7 +38,7 @@ from frf_ipz.updating.scale import MeasuredScale
 from frf_ipz.updating.updated_model import UpdatedModel
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     import control
 
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 
 ARRAYS = ("A", "B", "C", "D")
 MODES_SHOWN = 6
+MEMBERS, SIGNIFICANT = 20, 2.0  # of the posterior, and deviations from 0 of a residue that is known to be there
 NAMES = ("input_names", "output_names", "state_names", "input_units", "output_units")
 
 
@@ -160,7 +161,8 @@ def make_state_space(
     chosen = options or ExportOptions()
     ports = _ports(measured, updated_model, points, chosen, delays_s)
     system = _modal_system(updated_model.model, updated_model.scale, ports, chosen)
-    return _to_state_space(system, select_states(system), ports, chosen, scale=updated_model.scale)
+    selection = _select_known_states(system, updated_model, ports, chosen)
+    return _to_state_space(system, selection, ports, chosen, scale=updated_model.scale)
 
 
 def make_state_space_ensemble(
@@ -199,17 +201,9 @@ def make_state_space_ensemble(
     _require_exported(measured, updated_model, options, delays_s)
     chosen = options or ExportOptions()
     ports = _ports(measured, updated_model, points, chosen, delays_s)
-    members = updated_model.ensemble[: chosen.ensemble]
-    scales = updated_model.scale.members(len(members))
-    selection = select_states(
-        _modal_system(updated_model.model, updated_model.scale, ports, chosen)
-    )  # one for all: they have the same states
-    systems = (
-        _modal_system(
-            replace(updated_model.model, mass=mass, damping=damping, stiffness=stiffness), scale, ports, chosen
-        )
-        for (mass, damping, stiffness), scale in zip(members, scales, strict=True)
-    )
+    system = _modal_system(updated_model.model, updated_model.scale, ports, chosen)
+    selection = _select_known_states(system, updated_model, ports, chosen)  # one for all: they have the same states
+    systems = _systems_of_members(updated_model, ports, chosen, chosen.ensemble)
     return tuple(_to_state_space(system, selection, ports, chosen, scale=updated_model.scale) for system in systems)
 
 
@@ -413,6 +407,43 @@ def _modal_system(model: ReducedModel, scale: MeasuredScale, ports: Ports, optio
     outputs = np.array([scale.output_gain(port.dof) * model.row(port.dof) for port in ports.outputs])
     system = modal_form(model, inputs, outputs)
     return condense_high_modes(system, model.n_modes) if options.residual == "feedthrough" else system
+
+
+def _systems_of_members(
+    updated_model: UpdatedModel, ports: Ports, options: ExportOptions, count: int
+) -> Iterator[SecondOrder]:
+    members = updated_model.ensemble[:count]
+    scales = updated_model.scale.members(len(members))
+    for (mass, damping, stiffness), scale in zip(members, scales, strict=True):
+        model = replace(updated_model.model, mass=mass, damping=damping, stiffness=stiffness)
+        yield _modal_system(model, scale, ports, options)
+
+
+def _select_known_states(
+    system: SecondOrder, updated_model: UpdatedModel, ports: Ports, options: ExportOptions
+) -> Selection:
+    """Find the modes that ports drive and see, without those that only noise makes them drive.
+
+    An update bends shapes within what the measurement leaves open: of a mode with a node at the only input the residues
+    are no longer 0, but of either sign among the members, where nothing was measured of it.
+    """
+    selection = select_states(system)
+    nominal = _modal_system(updated_model.nominal, updated_model.nominal_scale, ports, options)
+    unseen = ~select_states(nominal).elastic
+    if unseen.shape != selection.elastic.shape or not (unseen & selection.elastic).any():
+        return selection
+    members = [_residues(member) for member in _systems_of_members(updated_model, ports, options, MEMBERS)]
+    if len(members) < MEMBERS or any(member.shape != members[0].shape for member in members):
+        return selection
+    of_noise = (np.abs(np.mean(members, axis=0)) <= SIGNIFICANT * np.std(members, axis=0)).all(axis=(1, 2))
+    known = selection.elastic & ~(unseen & of_noise)
+    return selection._replace(elastic=known) if known.any() or selection.seen else selection
+
+
+def _residues(system: SecondOrder) -> FloatArray:
+    """Give what outputs see of each elastic mode per force, (n_elastic, n_outputs, n_inputs), whatever its sign."""
+    elastic = slice(system.n_rigid, None)
+    return np.asarray(system.outputs[:, elastic].T[:, :, None] * system.inputs[elastic][:, None, :])
 
 
 def _to_state_space(
