@@ -644,8 +644,8 @@ class StructuralModel(Drawn):
     def _missing_dof_message(self, dof: Dof) -> str:
         if dof.unsigned in self.held_dofs:
             return (
-                f"the DOF {dof.name} is held in the model '{self.name}': its row of the matrices is that of a support, "
-                "so nothing moves there; use another DOF"
+                f"the DOF {dof.name} is held in the model '{self.name}': its row of the matrices is that of a support "
+                "or of a mass that couples to nothing, so nothing moves there with the structure; use another DOF"
             )
         directions = [known.direction for known in self.all_dofs if known.node == dof.node]
         if directions:

@@ -1,8 +1,10 @@
 """Rows that FE programs leave in exported matrices for DOFs that are held.
 
-Three ways are common: the rows are zero in mass and stiffness (Ansys); they are those of the identity (FEniCS and many
-scripts); or a penalty such as 1e36 stands on the diagonal of the stiffness (Abaqus, CalculiX). None of them is physics,
-and each becomes a mode that is not there, or drowns the modes that are.
+Four ways are common: the rows are zero in mass and stiffness (Ansys); they are those of the identity (FEniCS and many
+scripts); they are zero in the stiffness and have a mass of 1, which puts their modes at 0 Hz; or a penalty such as 1e36
+stands on the diagonal of the stiffness (Abaqus, CalculiX). None of them is physics, and each becomes a mode that is not
+there, or drowns the modes that are. A mass that nothing holds and nothing joins to the structure looks as the third
+way: it belongs to the structure as little.
 
 The scale is that of each row's own diagonal. With ``c`` the largest ``|K_ij| / sqrt(K_ii K_jj)`` of a row, to hold its
 DOF changes the stiffness of the others by ``c^2`` at most.
@@ -31,21 +33,24 @@ class HeldRows(NamedTuple):
 
     zero: BoolArray
     identity: BoolArray
+    loose: BoolArray
     penalty: BoolArray
 
     @property
     def any(self) -> BoolArray:
         """(n,) bool array: rows that are held in one way or another."""
-        return np.asarray(self.zero | self.identity | self.penalty)
+        return np.asarray(self.zero | self.identity | self.loose | self.penalty)
 
 
-def find_held_rows(mass: Matrix, stiffness: Matrix) -> HeldRows:
+def find_held_rows(mass: Matrix, stiffness: Matrix, *further: Matrix) -> HeldRows:
     """Find the rows of held DOFs.
 
     Parameters
     ----------
     mass, stiffness : (n, n) sparse array
         Both triangles; a held DOF's row or its column may be cleared, or both.
+    *further : (n, n) sparse array
+        What may join a mass without a spring to others (damping).
 
     Returns
     -------
@@ -63,7 +68,7 @@ def find_held_rows(mass: Matrix, stiffness: Matrix) -> HeldRows:
     coupled = coupling > UNCOUPLED
     none = np.zeros(len(inertia), bool)
     if not (coupled & (inertia > 0)).any():
-        return HeldRows(none, none, none)
+        return HeldRows(none, none, none, none)
     no_rigidity, no_inertia = (NOTHING * float(np.median(diagonal[coupled])) for diagonal in (rigidity, inertia))
     has_no_spring_beside = ~coupled & (_largest_beside(stiffness) <= no_rigidity)
     is_alone = has_no_spring_beside & (_largest_beside(mass) <= no_inertia)
@@ -72,10 +77,13 @@ def find_held_rows(mass: Matrix, stiffness: Matrix) -> HeldRows:
     is_foreign = float(np.median(rigidity[coupled])) > UNIT
     identity = is_alone & ~zero & (massless | (rigidity == inertia))
     identity |= has_no_spring_beside & (rigidity == 1.0) & is_foreign
+    loose = is_alone & ~massless & (rigidity <= no_rigidity)
+    for matrix in further:
+        loose &= _largest_beside(matrix) == 0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # no mass: no motion ever
         square = np.where(rigidity > 0, rigidity / inertia, 0.0)
     beyond = square > PENALTY * float(np.median(square[coupled & ~massless]))
-    return HeldRows(zero, identity, ~coupled & ~zero & ~identity & beyond)
+    return HeldRows(zero, identity, loose, ~coupled & ~zero & ~identity & ~loose & beyond)
 
 
 def _largest_beside(matrix: Matrix) -> FloatArray:

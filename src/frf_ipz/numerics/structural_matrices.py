@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray, Matrix
 
 DOFS_SHOWN = 6
+HELD = "held"
 STRUCTURAL = "structural"  # the imaginary part of the stiffness
 FEIGNED = 1e-10  # of the geometric mean of the diagonal: its square, by which it moves frequencies, is below rounding
 NO_DAMPING = 1e-12  # of the stiffness: an imaginary part that is rounding
@@ -65,13 +66,13 @@ class FreeRows:
         return {dof.node: "pinned" if dof.node in moving else "clamped" for dof in self.held_dofs}
 
 
-def select_free_rows(mass: Matrix, stiffness: Matrix, dofs: Sequence[Dof], *, held: str) -> FreeRows:
+def select_free_rows(matrices: Mapping[str, Matrix], dofs: Sequence[Dof], *, held: str) -> FreeRows:
     """Tell the rows of free DOFs from those that are left in matrices for held ones.
 
     Parameters
     ----------
-    mass, stiffness : (n, n) sparse array
-        Of all rows; they need not be symmetric.
+    matrices : mapping of str to (n, n) sparse array
+        ``mass``, ``stiffness`` and perhaps damping, of all rows; they need not be symmetric.
     dofs : sequence of Dof
         The DOF of each row.
     held : str
@@ -87,24 +88,28 @@ def select_free_rows(mass: Matrix, stiffness: Matrix, dofs: Sequence[Dof], *, he
     InputError
         If a value is not finite.
     """
+    mass, stiffness = matrices["mass"], matrices["stiffness"]
     for matrix in (mass, stiffness):
         require_finite("the matrices", matrix.data)
-    marks = find_held_rows(mass, stiffness)
+    further = [matrix for what, matrix in matrices.items() if what not in ("mass", "stiffness")]
+    marks = find_held_rows(mass, stiffness, *further)
     if held == "keep" or not marks.any.any():
         return FreeRows(rows=np.arange(len(dofs)), dofs=tuple(dofs), held_dofs=(), notes=())
     notes = []
-    for ways, rows in (
-        ("zero in mass and stiffness", marks.zero),
-        ("those of the identity", marks.identity),
-        ("marked by a penalty on the diagonal", marks.penalty),
+    for ways, why, rows in (
+        ("zero in mass and stiffness", HELD, marks.zero),
+        ("those of the identity", HELD, marks.identity),
+        (*_loose_masses(mass.diagonal()[marks.loose]), marks.loose),
+        ("marked by a penalty on the diagonal", HELD, marks.penalty),
     ):
         names = [dofs[row].name for row in np.flatnonzero(rows).tolist()]
         if names:
             shown = ", ".join(names[:DOFS_SHOWN]) + (", ..." if len(names) > DOFS_SHOWN else "")
             rows_are = "1 row is" if len(names) == 1 else f"{len(names)} rows are"
-            held_are = "this DOF is held, and" if len(names) == 1 else "these DOFs are held, and"
+            dofs_are = "this DOF is" if len(names) == 1 else "these DOFs are"
             notes.append(
-                f"{rows_are} {ways} ({shown}): {held_are} left out; [matrices] held = 'keep' takes the rows as they are"
+                f"{rows_are} {ways} ({shown}): {dofs_are} {why}, and left out; [matrices] held = 'keep' takes the rows "
+                "as they are"
             )
     free = np.flatnonzero(~marks.any)
     return FreeRows(
@@ -113,6 +118,15 @@ def select_free_rows(mass: Matrix, stiffness: Matrix, dofs: Sequence[Dof], *, he
         held_dofs=tuple(dofs[row] for row in np.flatnonzero(marks.any).tolist()),
         notes=tuple(notes),
     )
+
+
+def _loose_masses(masses: FloatArray) -> tuple[str, str]:
+    """Say what rows without stiffness are, and why: a mark of held DOFs is the same in all, masses of bodies differ."""
+    if len(np.unique(masses)) > 1:
+        many = f"{masses.min():.4g} to {masses.max():.4g}"
+        return f"zero in the stiffness, with masses of {many} that couple to nothing", "held by nothing"
+    one = f"{masses.max(initial=0.0):.4g}"
+    return f"zero in the stiffness, with a mass of {one} that couples to nothing", "held, or held by nothing"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -328,7 +342,7 @@ class ModelMatrices:
         whole["stiffness"], imaginary = _real_and_imaginary(matrices["stiffness"])
         if imaginary is not None:
             whole[STRUCTURAL] = imaginary
-        free = select_free_rows(whole["mass"], whole["stiffness"], dofs, held=options.held)
+        free = select_free_rows(whole, dofs, held=options.held)
         exported = ExportedRows.of(free, options)
         rounding = printed_rounding(whole["stiffness"][free.rows][:, free.rows].data)
         notes = list(free.notes)

@@ -1,5 +1,7 @@
 """Rows of held DOFs are found by the scale of their own diagonal, and nothing else is."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -64,6 +66,8 @@ HOLDS = {
     "zero": both(0.0, 0.0),
     "printed as 1e-30": both(1e-30, 1e-30),
     "identity in both": both(1.0, 1.0),
+    "zero, mass one": both(0.0, 1.0),
+    "zero, mass 2e-3": both(0.0, 2e-3),
     "identity and zero": both(1.0, 0.0),
     "a scale and zero": both(3.7e6, 0.0),
     "a scale in both": both(3.7e6, 3.7e6),
@@ -124,9 +128,9 @@ NOT_HELD = {
         sparse.csr_array(np.diag([0, 0, 4.0]) + np.array([[2.0, -1, 0], [-1, 1, 0], [0, 0, 0]])),
         sparse.csr_array(np.diag([1.0, 2.0, 0.7])),
     ),
-    "a mass without a spring": (
+    "a mass without a spring that others take along": (
         sparse.csr_array(np.array([[2e6, -1e6, 0], [-1e6, 1e6, 0], [0, 0, 0]])),
-        sparse.csr_array(np.diag([1.0, 2.0, 1.0])),
+        sparse.csr_array(np.array([[1.0, 0, 0], [0, 2, 0.1], [0, 0.1, 1]])),
     ),
 }
 
@@ -134,6 +138,30 @@ NOT_HELD = {
 @pytest.mark.parametrize(("stiffness", "mass"), NOT_HELD.values(), ids=NOT_HELD)
 def test_rows_of_a_structure_are_not_held(stiffness, mass):
     assert not find_held_rows(mass, stiffness).any.any()
+
+
+WITHOUT_SPRING = np.array([[2e6, -1e6, 0, 0], [-1e6, 1e6, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]])
+
+
+def test_masses_that_differ_are_said_to_be_held_by_nothing():
+    dofs = [frf_ipz.Dof(node, "z") for node in range(1, 5)]
+    for last, why in (
+        (1.0, "a mass of 1 .*DOFs are held, or held by"),
+        (3.0, "masses of 1 to 3 .*are held by"),
+    ):
+        mass = np.diag([1.0, 2.0, 1.0, last])
+        made = frf_ipz.StructuralModel.from_matrices(mass, WITHOUT_SPRING, dofs=dofs)
+        assert made.dofs == tuple(dofs[:2])
+        assert re.search(rf"zero in the stiffness, with {why} nothing, and left out", made.notes[0])
+
+
+def test_a_damper_alone_may_join_a_mass_to_the_structure():
+    dofs = [frf_ipz.Dof(node, "z") for node in range(1, 5)]
+    joined = np.zeros((4, 4))
+    joined[np.ix_([1, 2], [1, 2])] = [[5.0, -5.0], [-5.0, 5.0]]
+    mass = np.diag([1.0, 2.0, 1.0, 1.0])
+    made = frf_ipz.StructuralModel.from_matrices(mass, WITHOUT_SPRING, damping=joined, dofs=dofs)
+    assert made.dofs == tuple(dofs[:3])
 
 
 def test_rows_are_taken_as_they_are_where_the_user_says_so(tmp_path):
