@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from frf_ipz.arguments import as_path
-from frf_ipz.option_types import NotNegative, Seed
+from frf_ipz.option_types import NotNegative, Seed, Truth
 from frf_ipz.toml_files import STRICT, check_values
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class DiagnoseOptions:
 
     run: Literal["auto", "always", "never"] = "auto"
     seconds: NotNegative | None = None
-    apply: bool = False
+    apply: Truth = False
     effects: tuple[str, ...] = ()
     extra_effects: tuple[str, ...] = ()
     stiffness_tolerance: NotNegative = 1e-3

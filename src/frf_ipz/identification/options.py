@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from frf_ipz.errors import InputError
-from frf_ipz.option_types import Count, Frequency, Positive
+from frf_ipz.option_types import Count, Frequency, Positive, Truth
 from frf_ipz.toml_files import STRICT, check_values
 
 NEAR_PIN = 0.02  # relative distance up to which a pole is the one that was pinned or rejected
@@ -146,7 +146,7 @@ class FitOptions:
     modes: Literal["complex", "real"] = "complex"
     max_order: Count | None = None
     stability: Stability = Stability()
-    delay: bool | None = None
+    delay: Truth | None = None
     gain: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

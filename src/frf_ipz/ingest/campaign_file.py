@@ -29,7 +29,7 @@ from frf_ipz.ingest.formats.registry import read_frf_file, read_modes_file
 from frf_ipz.ingest.formats.transmissibility import no_reference
 from frf_ipz.ingest.units import sensitivity_factor, unit_factor
 from frf_ipz.meshes.registry import read_mesh
-from frf_ipz.option_types import Count, CountOrNone, Day, NotNegative, Positive, Ratio
+from frf_ipz.option_types import ColumnNumber, Count, CountOrNone, Day, NotNegative, Positive, Ratio, Truth
 from frf_ipz.quantities import RECIPROCALS, FrfQuantity
 from frf_ipz.toml_files import STRICT, read_toml
 
@@ -88,7 +88,7 @@ class TestKeys:
     name: str = ""
     nominal_damping_ratio: Ratio | None = None
     unknown_scale: Literal["none", "common", "per_channel"] = "none"
-    time_column: str | int = ""
+    time_column: str | ColumnNumber = ""
     sample_rate_hz: Positive | None = None
     header_row: Count | None = None
     applied_exponential_window_s: Positive | None = None
@@ -127,7 +127,7 @@ class ChannelKeys:
 
     __pydantic_config__ = STRICT
 
-    column: str | int
+    column: str | ColumnNumber
     role: Literal["input", "output"]
     quantity: Literal["force", "acceleration", "velocity", "displacement"]
     unit: str | None = None
@@ -244,7 +244,7 @@ class FrfKeys:
     skip_rows: CountOrNone = 0
     direction: str = ""
     sets: tuple[Count, ...] = ()
-    conjugated: bool = False
+    conjugated: Truth = False
     variables: dict[str, str] = field(default_factory=dict)
     level: Positive | None = None
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from frf_ipz.option_types import Count, CountOrNone, NotNegative, Positive, Seed
+from frf_ipz.option_types import Count, CountOrNone, NotNegative, Positive, Seed, Truth
 from frf_ipz.toml_files import STRICT, check_values
 
 
@@ -62,16 +62,16 @@ class UpdateOptions:
 
     method: str = "minimal-change"
     parameters: Literal["parts", "diagnosis"] = "parts"
-    mass: bool = False
-    damping: bool = True
+    mass: Truth = False
+    damping: Truth = True
     max_iterations: Count | None = None
     alpha: NotNegative = 0.1
     beta: Positive = 0.3
     delta: NotNegative = 1e-3
     delta_damping: NotNegative = 0.1
-    expand: bool = True
-    pair_again: bool = True
-    cross_sensitivities: bool = True
+    expand: Truth = True
+    pair_again: Truth = True
+    cross_sensitivities: Truth = True
     ensemble: CountOrNone = 200
     seed: Seed = 0
 

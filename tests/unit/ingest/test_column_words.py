@@ -100,6 +100,71 @@ def test_a_row_of_units_below_short_names_is_taken(tmp_path, row):
     np.testing.assert_allclose(frf_values(tmp_path), VALUES, rtol=DIGITS)
 
 
+LEVELS = [
+    ("Magnitude [dB re 1 m/s²/N]", 1.0),
+    ("Magnitude [dB re 1 g/N]", GRAVITY),
+    ("Magnitude [dB re 1e-6 m/s²/N]", 1e-6),
+    ("Magnitude dB (ref. 1 g/N)", GRAVITY),
+    ("Magnitude dB re 1 g/N", GRAVITY),
+    ("Betrag [dB, rel. 1 (m/s²)/N]", 1.0),
+    ("Magnitude [g/N dB]", GRAVITY),
+    ("Magnitude [g/N] (dB)", GRAVITY),
+    ("Magnitude dB g/N", GRAVITY),
+    ("Magnitude [dB re 1]", 1.0),
+]
+DECIBELS = 'columns = ["frequency_hz", "magnitude_db", "phase_deg"]'
+
+
+@pytest.mark.parametrize("keys", ["", DECIBELS, f"{DECIBELS}\nskip_rows = 1"])
+@pytest.mark.parametrize(("name", "reference"), LEVELS)
+def test_decibels_are_relative_to_the_unit_beside_them(tmp_path, name, reference, keys):
+    level = 20.0 * np.log10(np.abs(VALUES) / reference)
+    frf_file(tmp_path, f"Frequency [Hz];{name};Phase [deg]", (level, PARTS["decibels"][1]))
+    np.testing.assert_allclose(frf_values(tmp_path, keys), VALUES, rtol=DIGITS)
+
+
+@pytest.mark.parametrize("header", ["f;Magnitude;Phase\nHz;{};deg", "f [Hz];Y1 [{}];Y2", "f [Hz] Y1 [{}] Y2"])
+@pytest.mark.parametrize("unit", ["dB re 1e-3 g/N", "1e-3 g/N dB"])
+def test_a_reference_of_decibels_is_found_below_names_and_in_brackets(tmp_path, header, unit):
+    level = 20.0 * np.log10(np.abs(VALUES) / (1e-3 * GRAVITY))
+    frf_file(tmp_path, header.format(unit), (level, PARTS["decibels"][1]))
+    np.testing.assert_allclose(frf_values(tmp_path, DECIBELS), VALUES, rtol=DIGITS)
+
+
+@pytest.mark.parametrize("keys", [True, False])
+@pytest.mark.parametrize(
+    ("name", "role", "unit"),
+    [
+        ("Magnitude [dB re 1e-6]", "magnitude_db", "1e-6"),
+        ("Magnitude [dB re 1 g/N rms]", "magnitude_db", "1 g/N rms"),
+        ("Magnitude [dB re 1 foo]", "magnitude_db", "1 foo"),
+        ("Magnitude [g/N foo dB]", "magnitude_db", "g/N foo"),
+        ("Magnitude [g/N foo]", "magnitude", "g/N foo"),
+        ("Magnitude (g pro N)", "magnitude", "g pro N"),
+        ("Magnitude [foo]", "magnitude", "foo"),
+        ("Magnitude g/N foo", "magnitude", "g/N foo"),
+        ("Magnitude\n;g/N foo;", "magnitude", "g/N foo"),
+        ("Magnitude\n;g/N foo dB;", "magnitude_db", "g/N foo"),
+    ],
+)
+def test_what_stands_in_the_place_of_a_unit_and_is_none_is_refused(tmp_path, name, role, unit, keys):
+    head, _, row = name.partition("\n")
+    frf_file(
+        tmp_path, f"Frequency;{head};Phase [deg]" + (f"\n{row}" if row else ""), (np.abs(VALUES), np.angle(VALUES))
+    )
+    columns = f'columns = ["frequency_hz", "{role}", "phase_deg"]' if keys else ""
+    with pytest.raises(InputError, match=f"its header gives values in '{unit}'"):
+        frf_values(tmp_path, columns)
+    keys = f'{columns}\nunit = "g/N"'
+    assert np.isfinite(frf_values(tmp_path, keys)).all()
+
+
+@pytest.mark.parametrize("name", ["Magnitude [H11]", "Magnitude [abs]", "Magnitude [-]", "Magnitude (point 3)"])
+def test_other_words_in_brackets_are_no_units(tmp_path, name):
+    frf_file(tmp_path, f"Frequency [Hz];{name};Phase [deg]", PARTS["degrees"])
+    np.testing.assert_allclose(frf_values(tmp_path), VALUES, rtol=DIGITS)
+
+
 def test_names_that_say_nothing_are_named(tmp_path):
     frf_file(tmp_path, "Frequency;Y1;Y2", PARTS["cartesian"])
     with pytest.raises(

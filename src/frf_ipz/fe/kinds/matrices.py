@@ -19,7 +19,7 @@ from frf_ipz.fe.matrices.stored import MatrixRequest, StoredMatrix
 from frf_ipz.fe.model_options import DampingSection, ModelSection, PortSection
 from frf_ipz.meshes.registry import read_mesh
 from frf_ipz.numerics.structural_matrices import MatrixOptions, ModelMatrices
-from frf_ipz.option_types import Name
+from frf_ipz.option_types import Name, Truth
 from frf_ipz.structure import Part, StructuralModel, drawn_geometry
 from frf_ipz.toml_files import STRICT
 from frf_ipz.unit_systems import SI
@@ -111,7 +111,7 @@ class MatricesOptions:
     variables: MatrixNames | None = None
     group: tuple[MatrixGroup, ...] = ()
     held: Literal["auto", "keep"] = "auto"
-    allow_negative_stiffness: bool = False
+    allow_negative_stiffness: Truth = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -47,6 +47,9 @@ ROLES = (  # of a column, by its name; the first that fits
     ("magnitude_db", _spelled(rf"({MODULUS}|mod|gain|pegel|verstärkung).*db|^db")),
     ("magnitude", _spelled(rf"{MODULUS}|^mod$")),
 )
+LEVEL = re.compile(  # decibels, and the word before what they are relative to
+    r"(?<![a-z])db(?![a-z])(?:[\s_,;:()\[\]]*(?P<reference>ref?|rel)(?![a-z])[\s.:_]*)?", re.IGNORECASE
+)
 DEGREES = _spelled(r"deg|degré|gradi(?!e)|grados|graden|°|º|[\[(/] ?(ø|¡)")  # ° of DOS, of Macs
 GRAD = re.compile(
     r"(?<![a-z])grad(?![a-z])", re.IGNORECASE
@@ -76,8 +79,8 @@ def frf_role(name: str) -> str:
 
     Examples
     --------
-    >>> [frf_role(name) for name in ("Re", "Imaginärteil", "Réel [m/s²/N]", "Betrag [dB]", "Fase", "V/V")]
+    >>> [frf_role(name) for name in ("Re", "Imaginärteil", "Réel [m/s²/N]", "Betrag [dB re 1 g/N]", "Fase", "V/V")]
     ['real', 'imag', 'real', 'magnitude_db', 'phase_deg', '']
     """
-    composed = unicodedata.normalize("NFC", name)
+    composed = LEVEL.sub("dB ", unicodedata.normalize("NFC", name))  # 're' of 'dB re 1 g/N' is no real part
     return next((role for role, pattern in ROLES if pattern.search(composed)), "")

@@ -11,13 +11,23 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, complex_array
 from frf_ipz.errors import FileFormatError, QuantityError, did_you_mean
-from frf_ipz.ingest.formats.column_words import ANGULAR, FREQUENCY, frf_role
+from frf_ipz.ingest.formats.column_words import ANGULAR, FREQUENCY, LEVEL, frf_role
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
-from frf_ipz.ingest.formats.text_layout import COMMENT, NEWLINE, TextLayout, decode, name_and_unit, open_text, sniff
+from frf_ipz.ingest.formats.text_layout import (
+    COMMENT,
+    NEWLINE,
+    TextLayout,
+    decode,
+    is_number,
+    name_and_unit,
+    open_text,
+    sniff,
+)
 from frf_ipz.ingest.formats.text_table import not_a_number, read_blocks, require_once
 from frf_ipz.ingest.units import frequency_factor, frf_factor, is_frequency_unit, is_stated, is_unit
 from frf_ipz.late_imports import import_late
 from frf_ipz.quantities import FrfQuantity
+from frf_ipz.text_numbers import parse_number
 from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
@@ -42,9 +52,13 @@ KNOWN = (
     "variance",
     SKIP,
 )
-LINEAR = {"real", "imag", "magnitude"}  # columns whose values have the unit of the FRF
+DECIBELS = "magnitude_db"
+OF_VALUES = {"real", "imag", "magnitude", DECIBELS}  # columns in the unit of the FRF, or relative to it
 RATIO = re.compile(r"\(([^()]+)\)\s*\(([^()]+)\)")  # SignalCalc writes (m/s²)(N) for a ratio
 ENGINEERING = "eu"  # the unit of an analyser that was told none
+NO_UNIT = re.compile(r"h\d*(\(.*\))?|frf|lin(ear)?|point[ :]*\d*", re.IGNORECASE)  # what brackets hold beside units
+BRACKETS = re.compile(r"\[([^\[\]]*)\]")
+EMPTY_BRACKETS = re.compile(r"\[\W*\]|\(\W*\)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,39 +185,126 @@ def unit_of_values(rows: Sequence[Sequence[str]], names: Sequence[str]) -> Heade
     Returns
     -------
     HeaderUnit
-        A unit of FRFs or of their reciprocals wherever one stands; else what stands for a unit of real parts,
-        imaginary parts or magnitudes.
+        What stands beside the names of real parts, imaginary parts or magnitudes, also where it is no unit; else a unit
+        of FRFs or of their reciprocals wherever one stands; else what stands below those names.
+
+    Examples
+    --------
+    >>> names = ["frequency_hz", "magnitude_db", "phase_deg"]
+    >>> unit_of_values([["f [Hz]", "Magnitude [dB re 1 g/N]", "Phase [deg]"]], names).text
+    '1 g/N'
     """
-    fields = [field for row in rows for field in row]
-    for text in (*(name_and_unit(field)[1] for field in fields), *fields):
-        ratio = RATIO.fullmatch(text.strip())
-        for unit in (text, f"({ratio[1]})/({ratio[2]})") if ratio else (text,):
-            for quantity, is_reciprocal in product(FrfQuantity if unit.strip() else (), (False, True)):
-                try:
-                    frf_factor(f"1/({unit})" if is_reciprocal else unit, quantity, "z", "z")
-                except QuantityError:
-                    continue
-                return HeaderUnit(text=unit, quantity=quantity, is_reciprocal=is_reciprocal)
     of_values = [_of_values(row, names) for row in rows if len(row) == len(names)]
-    claimed = (_claimed_unit(field, is_alone=len(set(row)) == 1) for row in of_values for field in row)
+    beside = [_unit_beside(field, name) for row in of_values for field, name in row]
+    for text in filter(None, beside):
+        return _known_unit(text) or HeaderUnit(text=text)
+    fields = [field for row in rows for field in row]
+    cut = [" ".join(row) for row in rows if len(row) != len(names)]  # at the blanks within brackets too
+    whole = [_unit_beside(inner, DECIBELS) or inner for text in cut for inner in BRACKETS.findall(text)]
+    for text in (*(name_and_unit(field)[1] for field in fields), *whole, *fields):
+        unit = _known_unit(text)
+        if unit is not None:
+            return unit
+    claimed = (
+        _claimed_unit(field, name, is_alone=len({field for field, _ in row}) == 1)
+        for row in of_values
+        for field, name in row
+    )
     return HeaderUnit(text=next(filter(None, claimed), ""))
 
 
-def _of_values(row: Sequence[str], names: Sequence[str]) -> list[str]:
-    return [field for field, name in zip(row, names, strict=True) if name in LINEAR and field]
+def _of_values(row: Sequence[str], names: Sequence[str]) -> list[tuple[str, str]]:
+    return [(field, name) for field, name in zip(row, names, strict=True) if name in OF_VALUES and field]
 
 
-def _claimed_unit(field: str, *, is_alone: bool) -> str:
-    """Give what a field of a header claims to be a unit, in brackets or alone; empty where it is none.
+def _known_unit(text: str) -> HeaderUnit | None:
+    """Read a unit of FRFs or of their reciprocals; None where a text is neither."""
+    ratio = RATIO.fullmatch(text.strip())
+    for unit in (text, f"({ratio[1]})/({ratio[2]})") if ratio else (text,):
+        for quantity, is_reciprocal in product(FrfQuantity if unit.strip() else (), (False, True)):
+            try:
+                frf_factor(f"1/({unit})" if is_reciprocal else unit, quantity, "z", "z")
+            except QuantityError:
+                continue
+            return HeaderUnit(text=unit, quantity=quantity, is_reciprocal=is_reciprocal)
+    return None
 
-    Alone stands a unit that all parts of a value share, and none has another: 'Re' and 'Im' are names.
+
+def _unit_beside(field: str, name: str) -> str:
+    """Give what stands in the place of a unit beside the name of a column; empty where nothing does.
+
+    Decibels are relative to it, whatever the order: ``dB re 1 g/N``, ``g/N (dB)``.
     """
+    level = LEVEL.search(field) if name == DECIBELS else None
+    if level is None and not frf_role(field):
+        return ""
+    if level is not None:
+        if level["reference"]:
+            text = _closed(field[level.end() :])
+            return text if _is_stated_reference(text) else ""
+        field = EMPTY_BRACKETS.sub("", field[: level.start()] + field[level.end() :]).strip()
+    ratio = RATIO.search(field)
+    if ratio:
+        return ratio[0]
+    text = name_and_unit(field)[1]
+    if text:
+        return text if _is_claimed(text, name, is_square=field.endswith("]")) else ""
+    return _ratio_behind(field)
+
+
+def _closed(text: str) -> str:
+    """Take off brackets that were opened before a text."""
+    for opening, closing in ("[]", "()", "[]"):
+        if text.count(closing) > text.count(opening):
+            text = text.rstrip().removesuffix(closing)
+    return text.strip()
+
+
+def _is_stated_reference(text: str) -> bool:
+    """Tell a reference of decibels from 1, which says nothing."""
+    return is_stated(text) and not (is_number(text) and parse_number(text) == 1.0)
+
+
+def _is_claimed(text: str, name: str, *, is_square: bool) -> bool:
+    """Tell whether brackets beside a name claim to hold a unit; square ones do, but for what is known to be none."""
+    if not is_stated(text) or is_number(text) or NO_UNIT.fullmatch(text):
+        return False
+    if "/" in text or is_unit(text):
+        return True
+    if frf_role(text) == name:
+        return False
+    return is_square or bool(LEVEL.search(text)) or sum(map(is_unit, text.split())) > 1
+
+
+def _ratio_behind(field: str) -> str:
+    """Give a ratio of units, with its number and all that follows; empty where there is none."""
+    words = field.split()
+    place = next((place for place, word in enumerate(words) if _is_ratio(word)), None)
+    if place is None:
+        return ""
+    return " ".join(words[place - 1 if place and is_number(words[place - 1]) else place :])
+
+
+def _is_ratio(word: str) -> bool:
+    parts = word.split("/")
+    return len(parts) > 1 and all(is_unit(part.strip("()")) for part in parts)
+
+
+def _claimed_unit(field: str, name: str, *, is_alone: bool) -> str:
+    """Give what a field that names no column claims to be a unit, in brackets or alone; empty where it is none.
+
+    Alone stands a unit that all parts of a value share, and none has another: 'Re' and 'Im' are names. So may be a
+    letter above decibels.
+    """
+    if frf_role(field):
+        return ""
     unit = name_and_unit(field)[1]
     if is_stated(unit) and ("/" in unit or is_unit(unit)):
         return unit
-    if not is_alone or frf_role(field):
+    if not is_alone or (name == DECIBELS and "/" not in field):
         return ""
-    is_claimed = all(is_unit(part) or part.strip().lower() == ENGINEERING for part in field.split("/"))
+    parts = [part.strip() for part in field.replace("/", " ").split()]
+    is_claimed = any(map(is_unit, parts)) or {part.lower() for part in parts} == {ENGINEERING}
     return field if is_claimed else ""
 
 
