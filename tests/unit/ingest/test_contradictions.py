@@ -337,6 +337,35 @@ def test_several_impacts_that_contradict_the_others_alike_are_a_group_and_no_maj
         assert 0.4 < errors < 1.7  # 600 with four
 
 
+def cut_out(signals, rng):
+    """Lose the first channel just after the force, and once more later: noise is left, not one value."""
+    for first, last in ((106, 160), (500, 560)):
+        signals[1, first:last] = 1e-3 * rng.standard_normal(last - first)
+
+
+def turn(signals, _):
+    signals[1] += 0.3 * signals[2]
+
+
+@pytest.mark.parametrize("spoil", [cut_out, turn])
+@pytest.mark.parametrize("n_outputs", [1, 2])
+def test_impacts_that_contradict_alike_in_a_bad_channel_are_no_group(spoil, n_outputs):
+    """A cable that is loose for a moment; a sensor that turned, which a single channel cannot tell from a group."""
+    rng = np.random.default_rng(4)
+    records = [impact(Structure(), noise=NOISE, rng=rng, height=height) for height in (*HEIGHTS, 90.0)]
+    for number in (1, 2):
+        spoil(records[number], rng)
+    records = [signals[: 1 + n_outputs] for signals in records]
+    result = frf_ipz.estimate_frfs(in_memory(records, step_s=STEP_S, output_dofs=("1:+z", "2:+z")[:n_outputs]))
+    is_told = spoil is cut_out or n_outputs > 1
+    assert any("two groups" in text for text in result.warnings) == (not is_told)
+    assert list(result.frfs.averages) == [4 if is_told else 6, 6][:n_outputs]
+    if is_told:
+        assert all("output 1 contradicts the other impacts" in result.records.marks[number] for number in (1, 2))
+        assert not any("contradicts" in result.records.marks[number] for number in (0, 3, 4, 5))
+        assert truth_error(result).max() < 0.01
+
+
 def test_impacts_that_contradict_the_others_each_by_itself_are_left_out():
     result, errors = struck_beside([0.3, 0.0, 0.0, -0.5, 0.0, 0.0, 0.0], seed=3)
     assert result.records.used.tolist() == [False, True, True, False, True, True, True]

@@ -6,30 +6,42 @@ import numpy as np
 
 from frf_ipz.arrays import BoolArray, FloatArray
 
-EQUAL = 1e-6  # of the range: values that differ by less were the same reading
+EQUAL = 1e-6  # of the range, or of the extreme value: values that differ by less were the same reading
 FEWEST_STEPS = 30  # digital steps: a signal of fewer has equal extreme values by nature
 CORNER = 4.0  # digital steps: a smooth top falls off less than this beside two equal samples
 SYMMETRIC = 1e-3  # of the height: a pulse without noise that is sampled symmetrically has equal samples in pairs
 NEAR_TOP = 0.03  # of the height: samples just below the top
 PILED_UP = 3.0  # times as many samples at the top as smooth tops have
 STEEP = 0.01  # of the height: drop of the signal beside a plateau that was cut
+FAR_SIDE = 0.25  # of the range: the other side of a pulse, or of a signal that was cut on one side, is less
+FEWEST_CUTS = 2  # of the far side: a signal that rests there before it begins has one plateau
 
 
-def is_clipped(signal: FloatArray) -> bool:
+def is_clipped(signal: FloatArray, *, goes_one_way: bool = False) -> bool:
     """Tell whether a signal was cut off at its highest or lowest value.
 
     A smooth top may hold a few equal samples where the digital steps are coarse, and leaves them gently; a top that was
-    cut is left steeply, or is met again and again.
+    cut is left steeply, or is met again and again. Each side is judged by its own extreme value, however far the other
+    goes: an amplifier with an offset, or a stop, cuts one side.
 
     Parameters
     ----------
     signal : (n,) array
         As recorded.
+    goes_one_way : bool
+        A pulse, whose far side is noise.
 
     Returns
     -------
     bool
         True if it was.
+
+    Examples
+    --------
+    >>> time = np.arange(1000.0)
+    >>> decay = np.exp(-time / 200) * np.sin(0.2 * time)
+    >>> is_clipped(decay), is_clipped(np.minimum(decay, 0.1))
+    (False, True)
     """
     height = float(np.ptp(signal))
     if height == 0.0:
@@ -43,7 +55,12 @@ def is_clipped(signal: FloatArray) -> bool:
     is_symmetric = not step and abs(float(signal.max() + signal.min())) < EQUAL * height  # both ends of the range
     if is_symmetric and any(_has_corners(*side) for side in sides):
         return True
-    return any(_is_cut(*side, step, height) for side in sides)
+    return any(
+        _is_cut(*side, step)
+        if side[0].max() >= FAR_SIDE * height
+        else not goes_one_way and _is_far_side_cut(*side, step, height)
+        for side in sides
+    )
 
 
 def digital_step(signal: FloatArray) -> float:
@@ -98,17 +115,26 @@ def find_saturated_peaks(peaks: FloatArray, widths: FloatArray) -> BoolArray:
 
 def _find_plateaus(upward: FloatArray, reach: int) -> list[_Plateau]:
     top = float(upward.max())
-    at_top = upward >= top - EQUAL * float(np.ptp(upward))
+    at_top = upward >= top - EQUAL * top
     edges = np.flatnonzero(np.diff(at_top.astype(np.int8), prepend=0, append=0))
     return [_Plateau(upward, start, stop, top, reach) for start, stop in edges.reshape(-1, 2)]
 
 
-def _is_cut(upward: FloatArray, plateaus: list[_Plateau], step: float, height: float) -> bool:
+def _is_far_side_cut(upward: FloatArray, plateaus: list[_Plateau], step: float, height: float) -> bool:
     top = float(upward.max())
-    if top < 0.25 * height:  # the far side of a pulse that goes one way: its noise
+    if top < FEWEST_STEPS * max(step, EQUAL * height):
         return False
+    return sum(plateau.length >= 3 for plateau in _steep(plateaus, top, step)) >= FEWEST_CUTS
+
+
+def _steep(plateaus: list[_Plateau], top: float, step: float) -> list[_Plateau]:
     floor = max(STEEP * top, CORNER * step)
-    steep = [plateau for plateau in plateaus if plateau.drop > floor]
+    return [plateau for plateau in plateaus if plateau.drop > floor]
+
+
+def _is_cut(upward: FloatArray, plateaus: list[_Plateau], step: float) -> bool:
+    top = float(upward.max())
+    steep = _steep(plateaus, top, step)
     longest = max((plateau.length for plateau in steep), default=0)
     if step:
         return longest >= 3 or sum(plateau.length == 2 for plateau in steep) >= 2 or _is_piled_up(upward, plateaus)
@@ -134,7 +160,7 @@ def _has_corners(upward: FloatArray, plateaus: list[_Plateau]) -> bool:
     A sweep has hundreds of tops of one height.
     """
     n_at_top, n_near_top = _count_at_and_near_top(upward, plateaus)
-    return bool(n_at_top > PILED_UP * n_near_top * np.sqrt(EQUAL * np.ptp(upward) / (NEAR_TOP * upward.max())))
+    return bool(n_at_top > PILED_UP * n_near_top * np.sqrt(EQUAL / NEAR_TOP))
 
 
 def _is_piled_up(upward: FloatArray, plateaus: list[_Plateau]) -> bool:

@@ -239,7 +239,7 @@ def _find_late_start(
 
 
 def _find_clipping(test: VibrationTest, force: FloatArray) -> tuple[str, ...]:
-    return (f"clipping of {test.input_channel.column}",) if is_clipped(force) else ()
+    return (f"clipping of {test.input_channel.column}",) if is_clipped(force, goes_one_way=True) else ()
 
 
 def _find_bad_channels(

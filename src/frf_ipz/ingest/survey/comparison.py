@@ -161,6 +161,7 @@ def _compare_setup(
                     unlike.add((impact, output))
                 named[output] = f"{CONTRADICTS}: {explained or _difference(spectra, comparison, (impact, output))}"
     agree = [() if comparison is None else comparison.agreeing for comparison in comparisons]
+    unlike -= {(impact, spike.output) for impact, record in enumerate(records) for spike in record.spikes}  # a fault
     for output, second in _second_groups(spectra, agree, unlike).items():
         agree[output] = tuple(sorted((*agree[output], *second)))
         for impact in second:
@@ -188,6 +189,8 @@ def _second_groups(
 ) -> dict[int, tuple[int, ...]]:
     """Find the impacts that contradict the majority, but agree with each other: which group is right does not show.
 
+    Impacts that were struck beside their point contradict in all responses; in one of several a sensor is at fault.
+
     Parameters
     ----------
     spectra : ImpactSpectra
@@ -195,7 +198,7 @@ def _second_groups(
     agree : sequence of sequences of int
         The majority in each response.
     unlike : set of pairs of int
-        Impacts and responses that contradict it as nothing explains.
+        Impacts and responses that contradict it as nothing explains, no jump that was taken off either.
 
     Returns
     -------
@@ -208,7 +211,8 @@ def _second_groups(
         groups = find_two_groups(spectra, [output], sorted((*majority, *second))) if len(second) > 1 else None
         if groups is not None and second in (groups.first, groups.second):
             seconds[output] = second
-    return seconds
+    n_compared = sum(bool(majority) for majority in agree)
+    return seconds if len(seconds) > 1 or n_compared == 1 else {}
 
 
 def _say_groups(columns: Sequence[str], records: Sequence[RecordInfo], groups: Sequence[TwoGroups | None]) -> list[str]:
