@@ -22,6 +22,7 @@ LEAST_COHERENCE = 0.3  # of the median FRF on a line: below, the line says nothi
 LEAST_NOISE = 1e-6  # of an FRF's own modulus: no measurement is better, and a variance of zero weighs infinitely
 MODEL_ERROR = 1e-3  # the same where the noise was not measured: few structures are linear to less
 FEWEST_LINES = 16  # what the fit of a single mode needs
+ENOUGH_LINES = 48  # what start poles of order 24 need: four lines to each complex coefficient
 SIGNAL = 3.0  # times the noise, in modulus: where the median FRF is above, the band carries signal
 SHARED_SPREAD = 0.15  # rms relative deviation of weights from profile times gain that costs less than 3 % of efficiency
 
@@ -126,6 +127,8 @@ class MeasuredLines:
         What records lack of the force, over what they hold of it, where they begin within its pulse.
     gain_variance : (n_lines, n_frfs) array or None
         The part of the variance by relative errors that change slowly with frequency.
+    overlap : float
+        Lines that stand for one independent line: the variance is so much larger than the noise of one line.
     """
 
     frequency_hz: FloatArray
@@ -139,6 +142,7 @@ class MeasuredLines:
     force_noise: ForceNoise | None = None
     missing_force: ComplexArray | None = None
     gain_variance: FloatArray | None = None
+    overlap: float = 1.0
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -220,8 +224,12 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
     if not known.all():
         noise[:, ~known] = rough_variance(frfs.values[:, ~known])
     band = options.band_hz or _signal_band(frfs, noise, usable, has_variance=bool(known.all()))
-    independent = np.arange(frfs.n_lines) % frfs.correlated_lines == 0
-    used = usable & independent & frfs.in_band(band, options.exclude_hz)
+    in_band = usable & frfs.in_band(band, options.exclude_hz)
+    step = frfs.correlated_lines
+    if known.all():  # a variance that is found on the lines themselves holds no overlap
+        step = max(1, min(step, int(in_band.sum()) // ENOUGH_LINES))
+    taken = np.arange(frfs.n_lines) % step == 0
+    used = in_band & taken
     if used.sum() < FEWEST_LINES:
         if options.band_hz is None and usable.sum() >= FEWEST_LINES:
             raise InputError(
@@ -229,11 +237,11 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
                 f"{band[0]:g} to {band[1]:g} Hz; a fit needs {FEWEST_LINES}: check the measurement and its channels, "
                 "or set [fit] band_hz to where there is a signal"
             )
-        excluded = int((usable & independent & frfs.in_band(band)).sum()) >= FEWEST_LINES
+        excluded = int((usable & taken & frfs.in_band(band)).sum()) >= FEWEST_LINES
         way_out = "exclude less of it by [fit] exclude_hz" if excluded else "set a wider [fit] band_hz"
         raise InputError(
             f"only {int(used.sum())} usable frequency lines remain in the band {band[0]:g} to {band[1]:g} Hz; "
-            f"a fit needs {FEWEST_LINES}: {way_out}{'' if excluded else ' or a finer frequency resolution'}"
+            f"a fit needs {FEWEST_LINES}: {way_out}{'' if excluded else ', or record longer for finer lines'}"
         )
     lines = frfs.select_lines(used)
     options.require_within((float(lines.frequency_hz[0]), float(lines.frequency_hz[-1])))
@@ -241,7 +249,8 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
     if not known.all():  # once more in the band alone: the noise outside may be of another size
         noise[np.ix_(used, ~known)] = rough_variance(lines.values[:, ~known])
     variance = noise[used] + (np.where(known, LEAST_NOISE, MODEL_ERROR) * np.abs(lines.values)) ** 2
-    variance = np.maximum(variance, np.finfo(float).tiny * 1e40)
+    overlap = frfs.correlated_lines / step
+    variance = np.maximum(overlap * variance, np.finfo(float).tiny * 1e40)
     to_receptance = lines.s[:, None] ** powers
     return MeasuredLines(
         frequency_hz=lines.frequency_hz,
@@ -255,6 +264,7 @@ def measured_lines(frfs: FrfSet, options: FitOptions) -> MeasuredLines:
         force_noise=lines.force_noise,
         missing_force=lines.missing_force,
         gain_variance=None if lines.gain_variance is None else lines.gain_variance / np.abs(to_receptance) ** 2,
+        overlap=overlap,
     )
 
 

@@ -106,7 +106,7 @@ def shared_noise_factors(
     data, residues = lines.weighted(), fit.system.scaled_residues()
     error = np.zeros_like(lines.receptance) if noise is None else response(fit.system, terms, lines.s) * noise.relative
     slow = 0.0 if slow_variance is None else slow_variance
-    own = data.weight * np.sqrt(np.maximum(lines.variance - slow - np.abs(error) ** 2, 0.0))
+    own = data.weight * np.sqrt(np.maximum(lines.variance / lines.overlap - slow - np.abs(error) ** 2, 0.0))
     of_response = NoiseInTime.under_window(lines.s, windowed_s) if windowed_s else _on_lines
     covariance = np.zeros((2 * n_poles, 2 * n_poles))
     of_force, shared_samples = None, dict[int, FloatArray]()

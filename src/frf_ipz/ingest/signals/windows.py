@@ -200,7 +200,7 @@ def correlated_lines(decay: float) -> int:
     Returns
     -------
     int
-        At least 1. One in so many lines is independent: a fit takes one in so many.
+        At least 1. One in so many lines is independent: a fit takes one in so many, where they are enough.
     """
     if decay < 1e-6:
         return 1
