@@ -24,7 +24,7 @@ from frf_ipz.updating.tracking import TargetRoots, TrackedRoots, nominal_roots, 
 
 COMMON_STD = 1.5  # of the logarithm of the factor common to all modes
 MODE_STD = 0.3  # of the logarithm of the factor of each mode
-WIDEST = np.e  # of a mode's rate, more than three standard deviations of its logarithm
+WIDEST = float(np.exp(1.0))  # of a mode's rate, more than three standard deviations of its logarithm
 DASHPOT_STD = 0.1  # of the relative change of all dampers
 COUPLING_STD = 0.1  # of a coupling, relative to the two modes' rates
 LARGEST_STEP = 1.5  # of a logarithm in one iteration: the real part is not linear in it
