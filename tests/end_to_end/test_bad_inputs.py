@@ -139,7 +139,7 @@ CASES = {
     ),
     "no mode in the band": (
         lambda f: edit(f, "pipeline.toml", "[10.0, 600.0]", "[130.0, 250.0]"),
-        ["no mode", "248 Hz", "band_hz"],
+        ["no mode", "132 and 250 Hz", "band_hz"],
     ),
     "parameters of a diagnosis that is not applied": (
         lambda f: edit(f, "pipeline.toml", "[predict]", '[update]\nparameters = "diagnosis"\n[predict]'),
