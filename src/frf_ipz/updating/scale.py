@@ -26,11 +26,12 @@ of Standards 87 (1982) 377-385 (doi:10.6028/jres.087.022).
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from frf_ipz.arrays import BoolArray, FloatArray
+from frf_ipz.arrays import BoolArray, FloatArray, read_only
 from frf_ipz.dofs import Dof
 from frf_ipz.frf import FrfLabel
 from frf_ipz.late_imports import import_late
@@ -360,6 +361,7 @@ def _excitation_name(label: FrfLabel) -> str:
     return label.input_channel or label.input_dof.name
 
 
+@lru_cache(maxsize=4096)  # asked for each FRF of each member
 def local_errors(dof: AnyDof, count: int) -> FloatArray:
     """Draw errors of amplitudes at a node, the same ones at each call.
 
@@ -376,7 +378,7 @@ def local_errors(dof: AnyDof, count: int) -> FloatArray:
         Standard normal.
     """
     place = str(dof.node) if isinstance(dof, Dof) else dof.unsigned.name
-    return np.random.default_rng([SEED, *place.encode()]).standard_normal(count)
+    return read_only(np.random.default_rng([SEED, *place.encode()]).standard_normal(count))
 
 
 def fit_scale(

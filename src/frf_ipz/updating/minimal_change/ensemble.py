@@ -55,9 +55,13 @@ class Posterior:
 
     def model(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Give mass, damping and stiffness of the updated model, each (r, r)."""
+        mass, damping, stiffness = (self.frame.from_modal(matrix) for matrix in self._in_frame())
+        return mass, damping, stiffness
+
+    def _in_frame(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Mass, damping and stiffness in the coordinates in which they were updated."""
         mass, stiffness = self.stiffness.matrices(self.stiffness_result.theta)
-        damping = self.inner.from_modal(self.damping.damping(self.damping_result.theta))
-        return self.frame.from_modal(mass), self.frame.from_modal(damping), self.frame.from_modal(stiffness)
+        return mass, self.inner.from_modal(self.damping.damping(self.damping_result.theta)), stiffness
 
     def values(self, count: int) -> ComplexArray:
         """Roots of the updated model, followed from the stiffness that was found last: damping came before it.
@@ -72,10 +76,8 @@ class Posterior:
         (count,) complex array
             rad/s.
         """
-        phase, result = self.stiffness, self.stiffness_result
-        damping = self.inner.from_modal(self.damping.damping(self.damping_result.theta))
-        mass, stiffness = phase.matrices(result.theta)
-        return with_damping(phase.target_roots, result.tracked, mass, damping, stiffness).values(count)
+        roots, tracked = self.stiffness.target_roots, self.stiffness_result.tracked
+        return with_damping(roots, tracked, *self._in_frame()).values(count)
 
 
 def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:
