@@ -126,6 +126,23 @@ def test_magnitude_and_phase_as_real_and_imaginary_part_are_refused(tmp_path):
         assert "looks like magnitude and phase" in message(tmp_path, np.abs(VALUES) + 1j * phase)
 
 
+def test_a_mobility_without_negative_real_parts_is_read_whatever_its_size(tmp_path):
+    """As of a driving point; in some unit its imaginary part reaches just what an angle may."""
+    driving = (
+        1j
+        * LINES_HZ[:, None]
+        * sum(1 / (f**2 + 0.02j * f * LINES_HZ[:, None] - LINES_HZ[:, None] ** 2) for f in (61, 184))
+    )
+    for size in (np.pi, 180.0, 0.95 * 360.0):
+        values = driving * size / np.abs(driving.imag).max()
+        assert values.real.min() >= 0.0
+        expect(estimate(tmp_path, values, quantity="mobility"), values)
+        turned = np.abs(values) + 1j * (np.degrees(np.angle(values)) % 360.0)
+        assert "looks like magnitude and phase" in message(
+            tmp_path, 1e-3 * turned.real + 1j * turned.imag, quantity="mobility"
+        )
+
+
 def test_a_coherence_in_per_cent_or_above_1(tmp_path):
     coherence = np.linspace(0.6, 0.99, 301)
     result = estimate(tmp_path, coherence=(100 * coherence).tolist())

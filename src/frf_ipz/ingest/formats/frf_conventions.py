@@ -162,7 +162,7 @@ def _refuse_magnitudes(frf: MeasuredFrf) -> None:
         return
     problem = f"the FRF {frf.label} looks like magnitude and phase where real and imaginary part are expected"
     columns = "columns = ['frequency_hz', '{}', 'phase_deg']"
-    if (real >= 0.0).all():
+    if (real >= 0.0).all() and not (frf.source.quantity.power == 1 and _looks_like_circles(real, imag)):
         text = f"{problem}: no real part is negative; {way_out} with {columns.format('magnitude')}"
         raise FileFormatError(frf.source.path, text)
     if _looks_like_level(real, imag):
@@ -176,6 +176,15 @@ def _looks_like_phase(imag: FloatArray) -> bool:
     """Tell whether numbers reach a half turn, in degrees or radians, and no more."""
     largest = float(np.abs(imag).max())
     return any(NEAR * phase <= largest <= phase * (1.0 + PRINTED) for phase in LARGEST_PHASES)
+
+
+def _looks_like_circles(real: FloatArray, imag: FloatArray) -> bool:
+    """Tell whether parts may be those of a mobility that no mode turns round: of circles on the positive real axis.
+
+    So are driving points, of which no real part is negative (Ewins 2000, section 2.4). The largest imaginary part of a
+    circle is half of its largest real part; angles have nothing to do with the size of magnitudes.
+    """
+    return bool(real.max() / 4.0 <= np.abs(imag).max() <= real.max())
 
 
 def _looks_like_level(real: FloatArray, imag: FloatArray) -> bool:
