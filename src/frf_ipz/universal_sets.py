@@ -156,9 +156,19 @@ def read_data_sets(path: Path, kinds: Collection[str], *, advice: str) -> list[D
     -------
     list of DataSet
         In their order.
+
+    Raises
+    ------
+    FileFormatError
+        If one begins without its mark.
     """
     lines = read_bytes(path).decode("latin-1").splitlines()
     marks = [number for number, line in enumerate(lines) if line.strip() == END]
+    for end, begin in zip(marks[1::2], [*marks[2::2], len(lines)], strict=False):
+        unopened = next((number for number in range(end + 1, begin) if lines[number].strip() in kinds), None)
+        if unopened is not None:
+            problem = f"a data set {lines[unopened].strip()} begins without the line of -1 above it; put it there"
+            raise FileFormatError(path, f"{problem}, or export the file again", where=f"line {unopened + 1}")
     return [
         DataSet(path=path, lines=lines, kind=kind, first=begin + 2, end=end, advice=advice)
         for begin, end in zip(marks[::2], [*marks[1::2], len(lines)], strict=False)

@@ -7,6 +7,7 @@ import frf_ipz
 from frf_ipz.ingest.campaign_file import read_test
 from frf_ipz.ingest.estimate import estimate_frfs
 from frf_ipz.ingest.options import IngestOptions
+from frf_ipz.ingest.survey import contradictions
 from synthetic_campaign import HIT, Structure, impact, in_memory, respond, write_csv, write_test
 
 STEP_S = 1 / 2048
@@ -176,6 +177,27 @@ def test_a_weak_impact_below_the_noise_is_not_dead(tmp_path):
         return 0.002 * (signals - noise) + noise
 
     assert not any("is dead" in marks for marks in estimate(tmp_path, weaken).records.marks)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_response_that_just_does_not_stand_out_of_its_noise_is_not_dead(sign):
+    """What is expected of it does, by as little; of another response nothing is there."""
+    rng = np.random.default_rng(5)
+    noise, force = np.ones((5, 1, 400)), np.ones((5, 400)) * np.array([0.98, 1.3, 1.0, 1.5, 1.3])[:, None]
+    force[2] = 1.02
+    frf = np.exp(2j * np.pi * rng.uniform(size=400)) * np.sqrt(contradictions.STANDS_OUT)
+    responses = (frf * force)[:, None].astype(complex)
+    responses[0] = sign * frf * 0.99
+    force[0] = 1.02
+    responses[2] = rng.standard_normal((1, 400, 2)).view(complex)[..., 0] / np.sqrt(2.0)
+    spectra = contradictions.ImpactSpectra(
+        force=force.astype(complex),
+        responses=responses,
+        noise=noise,
+        force_noise=np.zeros(5),
+        valid=np.ones((5, 1), bool),
+    )
+    assert contradictions.find_dead(spectra, 0) == (2,)
 
 
 def test_the_majority_decides(tmp_path):

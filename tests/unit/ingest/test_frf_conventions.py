@@ -163,6 +163,13 @@ def test_a_coherence_in_per_cent_or_above_1(tmp_path):
     assert result.warnings == ()
 
 
+def test_a_coherence_of_0_on_all_lines_was_not_computed(tmp_path):
+    result = estimate(tmp_path, coherence=[0.0] * 301)
+    expect(result)
+    assert np.isnan(result.frfs.coherence).all()
+    assert "the coherence is 0 on all lines, as where none was computed: left out" in result.warnings[0]
+
+
 def test_files_of_different_resolution_share_the_coarse_lines(tmp_path):
     fine_hz = np.arange(0.0, 300.1, 0.25)
     fine = Structure().accelerance(2j * np.pi * fine_hz)

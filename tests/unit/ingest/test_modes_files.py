@@ -40,6 +40,15 @@ def universal(modes, *, analysis=2):
     return "\n".join(lines) + "\n"
 
 
+def test_a_data_set_without_its_first_mark_is_refused(tmp_path):
+    """It was lost without a word."""
+    first, second = universal(stated_modes(1)), universal(stated_modes(1))
+    (tmp_path / "modes.uff").write_text(first + second.removeprefix("    -1\n"))
+    line = first.count("\n") + 1
+    with pytest.raises(frf_ipz.FileFormatError, match=f"line {line}: a data set 55 begins without the line of -1 above"):
+        read(tmp_path / "modes.uff")
+
+
 def test_csv(tmp_path):
     modes = stated_modes(1)
     (tmp_path / "modes.csv").write_text(as_csv(modes))

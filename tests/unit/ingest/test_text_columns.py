@@ -335,6 +335,12 @@ def test_text_among_the_numbers_is_refused(tmp_path):
     assert re.search(r"line 25[89]: has 1 value where the table has 4 columns", message(path))
 
 
+def test_numbers_above_names_are_refused_where_they_are_more_than_those_below(tmp_path):
+    """As where a recording was put behind another one."""
+    path = write(tmp_path, lambda text: "rig 7\n" + text.partition("\n")[2] * 2 + text)
+    assert message(path)
+
+
 @pytest.mark.parametrize(
     "preamble",
     [
@@ -346,8 +352,9 @@ def test_text_among_the_numbers_is_refused(tmp_path):
         "Date,27/03/2025,x,y\n",
         "Channel,Input,Range,Coupling\n1,Dev1/ai0,5 V,IEPE\n2,Dev1/ai1,5 V,IEPE\n",
         "rig,7,2,11\nparam 1,1.5,1\n1,2,3,4\n\ncal,2.25,10.1,9.9\n\n",
+        "Set-up\n" + "".join(f"{place},{place / 10},0,{place**2}\n" for place in range(12)) + "\nComment: none\n",
     ],
-    ids=["pairs", "sentences", "comments", "long", "numbers", "wide", "table of channels", "numbers above text"],
+    ids=["pairs", "sentences", "comments", "long", "numbers", "wide", "table of channels", "numbers above text", "points"],
 )
 def test_text_above_the_names_is_left_out(tmp_path, preamble):
     expect(read(write(tmp_path, lambda text: preamble + text)))

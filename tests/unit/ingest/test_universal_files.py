@@ -134,6 +134,15 @@ def test_what_is_no_number_is_refused_with_its_line(tmp_path, wrong):
     assert re.search(rf"line 21: '{re.escape(wrong)}'", message(tmp_path, "\n".join(lines)))
 
 
+@pytest.mark.parametrize("kind", ["58", "164"])
+def test_a_data_set_without_its_first_mark_is_refused(tmp_path, kind):
+    """It was lost without a word."""
+    second = data_set(ends=BOTH_ENDS.replace("5 ", "6 ")) if kind == "58" else units_164(1.0, 1.0)
+    second = second.removeprefix("    -1\n")
+    text = message(tmp_path, data_set() + second)
+    assert f"line {data_set().count(chr(10)) + 1}: a data set {kind} begins without the line of -1" in text
+
+
 def test_a_file_that_is_cut_off_is_refused(tmp_path):
     text = data_set()
     for length in (len(text) // 2, 300, 20, len(text) - 40):

@@ -132,12 +132,17 @@ def _select(frf: MeasuredFrf, used: BoolArray, note: str) -> MeasuredFrf:
 
 
 def _check_coherence(frf: MeasuredFrf) -> MeasuredFrf:
-    """Bring a coherence in per cent to 0 to 1; leave out one that is above 1."""
+    """Bring a coherence in per cent to 0 to 1; leave out one that is above 1, or 0 all over."""
     coherence = frf.coherence
-    if coherence is None or not (coherence > 1.0).any():
+    if coherence is None:
+        return frf
+    name = f"{frf.source.path.name}, {frf.label}"
+    if (coherence == 0.0).all():
+        note = f"{name}: the coherence is 0 on all lines, as where none was computed: left out"
+        return replace(frf, coherence=None, notes=(*frf.notes, note))
+    if not (coherence > 1.0).any():
         return frf
     largest = float(np.nanmax(coherence))
-    name = f"{frf.source.path.name}, {frf.label}"
     if largest <= 1.0 + PRINTED:
         return replace(frf, coherence=np.minimum(coherence, 1.0))
     if PER_CENT < largest <= 100.0 * (1.0 + PRINTED) and np.nanmedian(coherence) > 1.0:

@@ -356,7 +356,8 @@ def _below_header(kept: Sequence[int], split: dict[int, list[str]], header_row: 
 def _first_row(kept: Sequence[int], split: dict[int, list[str]]) -> int | None:
     """Find the first line of numbers: the next one begins with a number and has as many fields.
 
-    A line above it that begins with a number, but has fewer numbers and text below it, is one of the text.
+    A line above it that begins with a number, but has fewer numbers and text below it, is one of the text. So is a
+    table of as many columns that nothing names, above a longer one that has names.
     """
     begins = [index for index in kept if _begins_row(split[index][0])]
     widths = Counter(len(split[index]) for index in begins)
@@ -364,7 +365,8 @@ def _first_row(kept: Sequence[int], split: dict[int, list[str]]) -> int | None:
     numbers = {index: sum(map(_is_entry, split[index])) for index in begins if len(split[index]) == usual}
     counts = Counter(numbers.values())
     most = max(counts, key=lambda count: counts[count], default=0)
-    whole = next((index for index in numbers if numbers[index] >= most), -1)
+    rows = [index for index in numbers if numbers[index] >= most]
+    whole = _first_of_table(kept, split, rows)
     text = max((index for index in kept if index < whole and index not in numbers), default=-1)
     begins = [index for index in begins if index > text]
     begins = [index for index in begins if len(split[index]) == usual]
@@ -372,6 +374,29 @@ def _first_row(kept: Sequence[int], split: dict[int, list[str]]) -> int | None:
     goes_on = (index for index in begins if _begins_as_row(following[index]))
     holds_numbers = (index for index in begins if any(map(_begins_row, following[index] or ["0"])))
     return next(chain(goes_on, holds_numbers, begins), None)
+
+
+def _first_of_table(kept: Sequence[int], split: dict[int, list[str]], rows: Sequence[int]) -> int:
+    """Give the first of some lines of numbers, but below the names of the longest run of them where they have names."""
+    places = {index: place for place, index in enumerate(kept)}
+    runs: list[list[int]] = []
+    for index in rows:
+        if runs and places[index] == places[runs[-1][-1]] + 1:
+            runs[-1].append(index)
+        else:
+            runs.append([index])
+    if not runs:
+        return -1
+    above = {kept[place]: split[kept[place - 1]] for place in range(1, len(kept))}
+    named = next((run for run in runs if _are_names(above.get(run[0], []), len(split[run[0]]))), None)
+    is_longest = named is not None and all(len(run) < len(named) for run in runs if run[0] < named[0])
+    return named[0] if named is not None and is_longest else rows[0]
+
+
+def _are_names(fields: Sequence[str], n_columns: int) -> bool:
+    """Tell a line that names columns: as many texts with letters, no two alike."""
+    with_letters = {field for field in fields if any(map(str.isalpha, field)) and not _is_entry(field)}
+    return len(fields) == len(with_letters) == n_columns > 1
 
 
 def _begins_as_row(fields: list[str] | None) -> bool:

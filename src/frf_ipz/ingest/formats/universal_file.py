@@ -49,6 +49,7 @@ ORDINATES: dict[int, tuple[int, int, tuple[int, ...], tuple[int, ...]]] = {
 }
 NAMES_AND_NODES = (5, 10, 5, 10, 1, 10, 10, 4, 1, 10, 10, 4)  # widths of the fields of record 6
 INTEGERS = (0, 1, 2, 3, 6, 7, 10, 11)  # those of them that are integers
+BEGINS_SET = re.compile(r"164|58(b .*)?", re.IGNORECASE)
 INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 N_TOKENS = 10  # of record 6, where no name has a blank
 
@@ -153,7 +154,7 @@ def read_functions(path: Path, data: bytes) -> tuple[UniversalFunction, ...]:
     functions: list[UniversalFunction] = []
     units: tuple[float, float] | None = None
     number = 0
-    while lines.skip_to_end_mark():
+    while lines.skip_to_begin_mark():
         if not lines.remaining:
             break
         head = lines.take()
@@ -208,6 +209,17 @@ class _Lines:
         while self.remaining:
             if self.take().strip() == "-1":
                 return True
+        return False
+
+    def skip_to_begin_mark(self) -> bool:
+        """Go behind the next line that begins a data set; False where there is none."""
+        while self.remaining:
+            text = self.take().strip()
+            if text == "-1":
+                return True
+            if BEGINS_SET.fullmatch(text):
+                problem = f"a data set {text[:3].strip()} begins without the line of -1 above it; put it there"
+                raise self.fault(f"{problem}, or export the file again")
         return False
 
     def fault(self, problem: str, line: int = 0) -> FileFormatError:

@@ -269,16 +269,27 @@ def find_dead(spectra: ImpactSpectra, output: int) -> tuple[int, ...]:
     Returns
     -------
     tuple of int
-        Those in which it does not stand out of its noise, where the FRF of those in which it does demands that; none
-        where the latter do not agree.
+        Those in which it does not stand out of its noise, where the FRF of those in which it does demands that, and
+        which are more like nothing than like what that FRF makes of the force, of either sign; none where the others
+        do not agree.
     """
     impacts = np.flatnonzero(spectra.valid[:, output])
     force, response, noise = spectra.force[impacts], spectra.responses[impacts, output], spectra.noise[impacts, output]
     alive = _stands_out(np.abs(response) ** 2, noise)
     if alive.all() or not alive.any() or (alive.sum() > 1 and not _is_coherent(force[alive], response[alive])):
         return ()
-    is_dead = ~alive & _stands_out(np.abs(_estimate_h1(force[alive], response[alive]) * force) ** 2, noise)
+    expected = _estimate_h1(force[alive], response[alive]) * force
+    is_dead = ~alive & _stands_out(np.abs(expected) ** 2, noise) & _is_rather_nothing(response, expected, noise)
     return tuple(int(impact) for impact in impacts[is_dead])
+
+
+def _is_rather_nothing(response: ComplexArray, expected: ComplexArray, noise: FloatArray) -> BoolArray:
+    """Tell for each impact whether a response is more likely as noise alone than with what is expected in it."""
+    misfits = [
+        np.sum(np.divide(np.abs(response - sign * expected) ** 2, noise, out=np.zeros(noise.shape), where=noise > 0.0), 1)
+        for sign in (0.0, 1.0, -1.0)
+    ]
+    return np.asarray(misfits[0] < np.minimum(*misfits[1:]))
 
 
 def _stands_out(power: FloatArray, noise: FloatArray) -> BoolArray:
