@@ -348,7 +348,15 @@ def test_files_without_common_lines(tmp_path):
     long_csv(tmp_path, outputs=("1:+z",))
     long_csv(tmp_path, name="b.csv", outputs=("2:+z",), lines_hz=LINES_HZ * 1.37)
     text = message(tmp_path, entry(), entry("b.csv"))
-    assert re.search(r"b\.csv: the lines of 2:.* are not those of 1:.* in frf\.csv", text), text
+    assert re.search(r"b\.csv: the lines of 2:.* are not those of 1:.* in frf\.csv .*they share \d+;", text), text
+
+
+def test_half_of_the_lines_is_enough_by_whatever_line_they_begin(tmp_path):
+    """Of lines of 0.6 Hz from 0.6 Hz on, 199 of 399 are lines of 0.4 Hz too: one less than half of them and one."""
+    long_csv(tmp_path, outputs=("1:+z",), lines_hz=0.4 * np.arange(1, 402))
+    long_csv(tmp_path, name="b.csv", outputs=("2:+z",), lines_hz=0.6 * np.arange(1, 402))
+    hertz = read(tmp_path, entry(), entry("b.csv")).frfs.frequency_hz
+    np.testing.assert_allclose(hertz, 1.2 * np.arange(1, 134))
 
 
 def test_frfs_of_the_ground_are_refused(tmp_path):

@@ -285,7 +285,7 @@ def _common_lines(frfs: Sequence[MeasuredFrf]) -> tuple[FloatArray, tuple[str, .
     lines = coarsest.frequency_hz
     for frf in frfs:
         lines = lines[_contains(frf.frequency_hz, lines)]
-    if len(lines) < max(2, FEWEST_COMMON * _count_between(coarsest.frequency_hz, low, high)):
+    if len(lines) < max(2, int(FEWEST_COMMON * _count_between(coarsest.frequency_hz, low, high))):
         raise _no_common_lines(frfs)
     largest = max(len(frf.frequency_hz) for frf in frfs)
     if len(lines) < largest:
@@ -327,14 +327,20 @@ def _no_common_lines(frfs: Sequence[MeasuredFrf]) -> FileFormatError:
         for frf in (outlier, other)
     ]
     problem = f"the lines of {outlier.label} ({texts[0]}) are not those of {other.label} in {other.source.path.name}"
-    way_out = f" ({texts[1]}): all FRFs of a test need common lines; export them alike"
+    shared = f"they share {int(_shared_lines(outlier, other).sum())}"
+    way_out = f" ({texts[1]}): {shared}; all FRFs of a test need common lines, so export them alike"
     return FileFormatError(outlier.source.path, problem + way_out)
 
 
 def _share(frf: MeasuredFrf, other: MeasuredFrf) -> float:
     """Give the share of the lines of the coarser one that the other has too."""
+    return float(_shared_lines(frf, other).mean())
+
+
+def _shared_lines(frf: MeasuredFrf, other: MeasuredFrf) -> np.ndarray:
+    """Tell which lines of the coarser one the other has too."""
     coarse, fine = sorted((frf.frequency_hz, other.frequency_hz), key=len)
-    return float(_contains(fine, coarse).mean())
+    return _contains(fine, coarse)
 
 
 def _contains(frequency_hz: FloatArray, lines: FloatArray) -> np.ndarray:
