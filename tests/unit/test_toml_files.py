@@ -54,7 +54,11 @@ def test_encodings_of_the_contract_are_read(tmp_path, text):
         ('[fit]\nband_hz = [1, "a"]', "key 'fit.band_hz.[2]'", "given is 'a'"),
         ("[fit]\nband_hz = 3", "key 'fit.band_hz'", "given is 3"),
         ("[fit]\nstrike = [{ hz = 1 }]", "key 'fit.strike.[1].why'", "is missing"),
-        ("[fit]\nstrike = [91.7]", "key 'fit.strike.[1]'", "must be a table { ... } with keys of hz, why; given is 91.7"),
+        (
+            "[fit]\nstrike = [91.7]",
+            "key 'fit.strike.[1]'",
+            "must be a table { ... } with keys of hz, why; given is 91.7",
+        ),
         ("[fit]\nband_hz = []", "key 'fit.band_hz.[2]'", "value 2 is missing"),
         ("[fit\n", "", "not valid TOML"),
     ],

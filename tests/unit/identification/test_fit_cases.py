@@ -13,7 +13,7 @@ from frf_ipz.identification.measured_lines import measured_lines
 from frf_ipz.identification.options import FitOptions, PinnedPole, RejectedPole
 from frf_ipz.identification.search.delays import common_delay
 from frf_ipz.quantities import FrfQuantity
-from synthetic_frfs import accelerances, count, frf_set, labels_of, normalised_errors, random_modes, with_noise
+from synthetic_frfs import Modes, accelerances, count, frf_set, labels_of, normalised_errors, random_modes, with_noise
 
 LINES_HZ = np.arange(1, 4097) * 0.25
 TO_400_HZ = LINES_HZ[3:1600:4]
@@ -192,6 +192,21 @@ def test_noise_that_was_not_measured():
     assert_complete(fit, truth)
     assert_calibrated(fit, truth)
     assert fit.noise_from == "misfit"
+
+
+def test_a_weak_mode_under_the_peak_of_a_strong_one_is_a_mode_where_nothing_is_left():
+    """An error of the strong one, whose noise was not measured either, would leave something."""
+    hertz = np.array([120.0, 188.0, 316.23, 318.16, 473.0, 557.0, 712.0, 769.0, 894.0, 1444.0])
+    shapes = np.array(
+        [
+            [0.65, 0.09, 1.31, 0.23, 2.33, 0.35, 0.10, 0.90, 1.49, 0.43],
+            [0.07, -4.0, -0.75, 1.43, 0.53, -0.42, -0.53, 2.69, -2.11, 1.99],
+            [3.27, 0.62, -1.84, 1.84, -1.77, 0.02, -1.59, 0.51, 2.73, 1.93],
+        ]
+    )
+    frfs = accelerances(Modes(hertz, 0.006 + 0 * hertz, shapes, shapes[:1]), np.arange(20.0, 900.0), noise=1e-3)
+    fit = fit_modes(frf_set(frfs.frequency_hz, frfs.values, frfs.labels), options=FitOptions())
+    np.testing.assert_allclose(fit.modes["frequency_hz"], hertz[:-1], rtol=1e-4)
 
 
 @pytest.mark.parametrize("law", ["even", "in proportion"])

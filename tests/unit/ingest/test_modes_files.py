@@ -45,7 +45,9 @@ def test_a_data_set_without_its_first_mark_is_refused(tmp_path):
     first, second = universal(stated_modes(1)), universal(stated_modes(1))
     (tmp_path / "modes.uff").write_text(first + second.removeprefix("    -1\n"))
     line = first.count("\n") + 1
-    with pytest.raises(frf_ipz.FileFormatError, match=f"line {line}: a data set 55 begins without the line of -1 above"):
+    with pytest.raises(
+        frf_ipz.FileFormatError, match=f"line {line}: a data set 55 begins without the line of -1 above"
+    ):
         read(tmp_path / "modes.uff")
 
 

@@ -354,7 +354,17 @@ def test_numbers_above_names_are_refused_where_they_are_more_than_those_below(tm
         "rig,7,2,11\nparam 1,1.5,1\n1,2,3,4\n\ncal,2.25,10.1,9.9\n\n",
         "Set-up\n" + "".join(f"{place},{place / 10},0,{place**2}\n" for place in range(12)) + "\nComment: none\n",
     ],
-    ids=["pairs", "sentences", "comments", "long", "numbers", "wide", "table of channels", "numbers above text", "points"],
+    ids=[
+        "pairs",
+        "sentences",
+        "comments",
+        "long",
+        "numbers",
+        "wide",
+        "table of channels",
+        "numbers above text",
+        "points",
+    ],
 )
 def test_text_above_the_names_is_left_out(tmp_path, preamble):
     expect(read(write(tmp_path, lambda text: preamble + text)))

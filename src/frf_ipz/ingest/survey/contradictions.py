@@ -286,7 +286,9 @@ def find_dead(spectra: ImpactSpectra, output: int) -> tuple[int, ...]:
 def _is_rather_nothing(response: ComplexArray, expected: ComplexArray, noise: FloatArray) -> BoolArray:
     """Tell for each impact whether a response is more likely as noise alone than with what is expected in it."""
     misfits = [
-        np.sum(np.divide(np.abs(response - sign * expected) ** 2, noise, out=np.zeros(noise.shape), where=noise > 0.0), 1)
+        np.sum(
+            np.divide(np.abs(response - sign * expected) ** 2, noise, out=np.zeros(noise.shape), where=noise > 0.0), 1
+        )
         for sign in (0.0, 1.0, -1.0)
     ]
     return np.asarray(misfits[0] < np.minimum(*misfits[1:]))
