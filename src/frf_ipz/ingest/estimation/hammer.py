@@ -96,9 +96,10 @@ def _add_noise(
     noise.scaled_force[rows] += scales * weights * force**2
     noise.pulse[rows] += force * spectrum * np.exp(2j * np.pi * frequency_hz * record.trigger * record.step_s)
     noise.cut_off[rows] += weights * force * _beyond_the_end(info, record, survey, decay)
-    if any(info.missing_force):
-        count = len(info.missing_force)
-        lost = info.missing_force * exponential_window(count, 1.0, rate, count + record.trigger)
+    missing_samples = info.missing_force if any(info.missing_force) else info.missing_ringing
+    if any(missing_samples):
+        count = len(missing_samples)
+        lost = missing_samples * exponential_window(count, 1.0, rate, count + record.trigger)
         earlier = np.exp(2j * np.pi * frequency_hz * count * record.step_s)
         missing = spectrum.conj() * np.fft.rfft(lost, survey.n_samples) * earlier
         first = slice(0, count + 1)
