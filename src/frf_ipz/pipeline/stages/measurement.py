@@ -107,6 +107,12 @@ def _files_of_ingest(result: FrfEstimate) -> Writers:
     return {**files, "coherence.parquet": partial(write_table, tables.coherence_table(result))}
 
 
+def _delays_s(frfs: FrfSet, result: ModalFit) -> list[float]:
+    """Give the delay of each FRF that the fit took off, s."""
+    delays = dict(zip(result.misfit["frf"], result.misfit["delay_s"], strict=True))
+    return [float(delays.get(number, 0.0)) for number in range(frfs.n_frfs)]
+
+
 def _files_of_fit(frfs: FrfSet, result: ModalFit) -> Writers:
     """Write the modes; and, where there are FRFs, them, their zeros and what the fit leaves of them."""
     scale_is_known = frfs.unknown_scale == "none"
@@ -118,7 +124,7 @@ def _files_of_fit(frfs: FrfSet, result: ModalFit) -> Writers:
         return files
     return {
         **files,
-        "frf.parquet": partial(write_table, tables.frf_table(result.without_window(frfs))),
+        "frf.parquet": partial(write_table, tables.frf_table(result.without_window(frfs), _delays_s(frfs, result))),
         "zeros.parquet": partial(write_table, tables.zero_table(result)),
         "fit.parquet": partial(write_table, tables.misfit_table(result)),
     }
