@@ -40,7 +40,7 @@ def test_keys_of_stages_that_need_a_model_have_no_effect_without_one(files):
     texts = warnings_of(
         measured(),
         reduce=frf_ipz.ReduceOptions(modes=5),
-        update=frf_ipz.UpdateOptions(alpha=0.1),
+        update=frf_ipz.UpdateOptions(alpha=0.2),
         export=frf_ipz.ExportOptions(pade_order=3, files=files),
     )
     assert "[reduce] modes; [update] alpha; [export] pade_order: no effect without an FE model" in texts
