@@ -12,7 +12,7 @@ BAND_HZ = (20.0, 280.0)
 
 
 def filtered_force(height, onset, n_samples=8192):
-    """Half a sine squared, 1.25 ms wide, through a filter of linear phase: one to 0.8 of its band, nothing at its end."""
+    """Give a sine squared through a filter of linear phase: one to 0.8 of its band, nothing at its end."""
     fine = 64
     time = np.arange(n_samples * fine) / fine - BEFORE - onset
     width = 2.6

@@ -61,7 +61,7 @@ def test_impacts_of_equal_noise_count_as_before():
 
 
 def test_noise_that_grows_with_the_impact_makes_none_noisier():
-    """An amplifier that chooses its range: the strongest impact has most noise, and its FRF is as good as the others'."""
+    """An amplifier that chooses its range: the strongest impact has most noise, and an FRF as good as the others."""
     rng = np.random.default_rng(6)
     impacts = [impact(STRUCTURE, height=height, noise=NOISE * height / 100.0, rng=rng) for height in HEIGHTS]
     marks = frf_ipz.estimate_frfs(in_memory(impacts)).records.marks

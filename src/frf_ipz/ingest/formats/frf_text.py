@@ -267,8 +267,8 @@ def _is_stated_reference(text: str) -> bool:
 def _is_claimed(text: str, name: str, *, is_square: bool) -> bool:
     """Tell whether brackets beside a name claim to hold a unit.
 
-    Square ones do, but for what is known to be none; round ones where it is one, or what stands in its place where values
-    have no scale. Else they hold a remark.
+    Square ones do, but for what is known to be none; round ones where it is one, or what stands in its place where
+    values have no scale. Else they hold a remark.
     """
     if not is_stated(text) or is_number(text) or NO_UNIT.fullmatch(text):
         return False

@@ -146,9 +146,9 @@ class PeriodicForce:
         )
 
     def __add__(self, record: Self) -> Self:
-        return type(self)(**{
-            field.name: getattr(self, field.name) + getattr(record, field.name) for field in fields(self)
-        })
+        return type(self)(
+            **{field.name: getattr(self, field.name) + getattr(record, field.name) for field in fields(self)}
+        )
 
     def is_noise(self) -> BoolArray:
         """Tell on which lines the force is noise alone, as lines between those that a generator excites.
