@@ -6,6 +6,7 @@ from it too.
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -180,19 +181,26 @@ FILES = {
 }
 
 
-def frf_table(frfs: FrfSet) -> pa.Table:
+def frf_table(frfs: FrfSet, delay_s: Sequence[float] = ()) -> pa.Table:
     """Table of measured FRFs, one row a line and FRF.
 
     Parameters
     ----------
     frfs : FrfSet
         The FRFs.
+    delay_s : sequence of float, optional
+        Delay of each that a fit found, and that its values still have, s.
 
     Returns
     -------
     pyarrow.Table
-        ``frf.parquet``.
+        ``frf.parquet``; ``delay_s`` of its metadata is an object of the delays other than 0, ``output / input``.
     """
+    late = {
+        f"{label.output_dof} / {label.input_dof}": float(delay)
+        for label, delay in zip(frfs.labels, delay_s, strict=bool(len(delay_s)))
+        if delay
+    }
     values = {
         **_label_columns(frfs.labels, frfs.n_lines),
         **_value_columns(frfs.values),
@@ -201,7 +209,8 @@ def frf_table(frfs: FrfSet) -> pa.Table:
         "variance": frfs.variance.T.ravel(),
         "averages": np.repeat(frfs.averages, frfs.n_lines),
     }
-    return make_table(FRF, values, about={"window_decay_1_s": repr(frfs.window_decay_1_s)})
+    about = {"window_decay_1_s": repr(frfs.window_decay_1_s), "delay_s": json.dumps(late)}
+    return make_table(FRF, values, about=about)
 
 
 def pole_table(fit: ModalFit) -> pa.Table:

@@ -64,6 +64,7 @@ if TYPE_CHECKING:
 else:
     pd = import_late("pandas")
 
+STAYS = "frf.parquet keeps the FRFs as measured, and says the delay of each in its metadata"
 FRFS_SHOWN = 6  # in one warning
 CHANCE = 1e-3  # that the noise of some FRF is known so badly that it is said to be missed
 NOISE_ROUNDS = 3  # of fitting residues and estimating the noise in turn
@@ -393,7 +394,7 @@ def _warnings(
         late = "responses come later than the force" if delay > 0 else "the force comes later than the responses"
         texts.append(
             f"{late}, all by {1e3 * abs(delay):.4g} ms (+- {1e3 * std:.1g} ms), which the fit takes off: without it "
-            "the modes are not normal; [fit] delay = true fits each channel's delay, delay = false none"
+            f"the modes are not normal; {STAYS}; [fit] delay = true fits each channel's delay, delay = false none"
         )
     if fitted.has_delayed_channels:
         delays = {
@@ -404,7 +405,7 @@ def _warnings(
         listed = ", ".join(f"{channel} {1e3 * delay_s:+.4g} ms" for channel, delay_s in delays.items())
         texts.append(
             f"responses come later than the force, or before it, each by its own delay, which the fit takes off: "
-            f"{listed}; [fit] delay = false fits none"
+            f"{listed}; {STAYS}; [fit] delay = false fits none"
         )
     if fitted.force_error is not None:
         texts.append(_force_error_text(frfs, fitted.force_error))

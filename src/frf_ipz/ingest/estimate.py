@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from frf_ipz.arguments import require_type
@@ -25,6 +26,8 @@ else:
     RecordingFiles = import_late("frf_ipz.ingest.recording_files", "RecordingFiles")
 
 FROM_RECORDINGS = {"hammer": estimate_hammer, "random": estimate_random}
+OF_IMPACTS = ("force_window_s", "exponential_window_s")
+OF_RECORDINGS = ("estimator", *OF_IMPACTS, "segment_s", "keep", "drop")
 FROM_RESULTS = {"frf": estimate_frf_files, "modes": hand_on_modes}
 
 
@@ -104,4 +107,19 @@ def estimate_from(files: RecordingFiles, options: IngestOptions, progress: Progr
     else:
         result = FROM_RECORDINGS[kind](files, options, progress)
     progress(1.0, "FRFs estimated")
-    return result
+    idle = _idle_keys(files.test, options)
+    return replace(result, warnings=(*result.warnings, *idle)) if idle else result
+
+
+def _idle_keys(test: VibrationTest, options: IngestOptions) -> tuple[str, ...]:
+    """Name keys of ``[ingest]`` that have no effect on a test of its kind."""
+    several = len(test.input_channels) > 1
+    keys, kind = {
+        "frf": (OF_RECORDINGS, "FRFs were estimated elsewhere"),
+        "modes": (OF_RECORDINGS, "modes were identified elsewhere"),
+        "hammer": (("segment_s",), "impacts are not cut into segments"),
+        "random": (OF_IMPACTS if several else OF_IMPACTS[:1], "it is a test with a shaker"),
+    }[test.kind]
+    default = IngestOptions()
+    idle = [key for key in keys if getattr(options, key) != getattr(default, key)]
+    return (f"[ingest] {', '.join(idle)}: no effect, as {kind}",) if idle else ()

@@ -15,6 +15,7 @@ from frf_ipz.arrays import FloatArray, read_only
 from frf_ipz.errors import InputError
 from frf_ipz.frf import FrfLabel
 from frf_ipz.ingest.campaign import setup_labels
+from frf_ipz.ingest.signals.clipping import find_clipped_part
 from frf_ipz.ingest.signals.windows import window_impact
 from frf_ipz.ingest.survey.hammer import survey_hammer
 from frf_ipz.ingest.survey.random import survey_random
@@ -66,6 +67,8 @@ class Record:
         What is wrong with it.
     used : bool
         It enters the FRFs.
+    restored : (n_outputs, n_samples) array
+        What of `responses` is an estimate of what an overload cut off; 0 for all others.
     """
 
     name: str
@@ -82,9 +85,10 @@ class Record:
     start_s: float
     marks: tuple[str, ...]
     used: bool
+    restored: FloatArray
 
     def __post_init__(self) -> None:
-        for name in ("force", "responses"):
+        for name in ("force", "responses", "restored"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
@@ -179,13 +183,19 @@ def _make_record(test: VibrationTest, info: RecordInfo, signals: FloatArray) -> 
     signals = info.correct(signals[1:])
     labels = setup_labels(test.channels, info.setup)
     outputs = info.used_outputs if info.used else tuple(range(len(labels)))
+    responses = signals[1:][list(outputs)]
+    restored = np.zeros_like(responses)
+    if info.used:
+        for row, output in enumerate(outputs):
+            if any(at == output for at, _ in info.channel_faults):
+                restored[row] = find_clipped_part(responses[row])
     return Record(
         name=info.name,
         labels=tuple(labels[output] for output in outputs),
         outputs=outputs,
         step_s=info.step_s,
         force=signals[0],
-        responses=signals[1:][list(outputs)],
+        responses=responses + restored,
         trigger=info.trigger,
         force_interval=info.force_interval,
         starts_at_rest=info.starts_at_rest,
@@ -194,4 +204,5 @@ def _make_record(test: VibrationTest, info: RecordInfo, signals: FloatArray) -> 
         start_s=info.start * info.step_s,
         marks=info.marks,
         used=info.used,
+        restored=restored,
     )

@@ -1,5 +1,7 @@
 """Parquet tables carry unit and meaning of every column."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
@@ -32,6 +34,13 @@ def test_the_frf_table_is_that_of_the_contract(tmp_path):
     assert list(table.columns) == CONTRACT
     row = table[(table.output_dof == "2:-z") & (table.frequency_hz == 3.0)].iloc[0]
     assert (row.real, row.imag, row.averages, row.quantity, row.input_dof) == (6.0, -1.0, 1, "accelerance", "5:+z")
+
+
+def test_late_frfs_stay_as_measured_and_say_their_delay():
+    table = frf_table(frfs(), [0.0, 1.5e-3])
+    assert table["real"].to_pylist()[3:] == [2.0, 4.0, 6.0]
+    assert json.loads(table.schema.metadata[b"delay_s"]) == {"2:-z / 5:+z": 1.5e-3}
+    assert frf_table(frfs()).schema.metadata[b"delay_s"] == b"{}"
 
 
 def test_unknown_values_are_null_not_nan():

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+import frf_ipz
 from frf_ipz.ingest.signals.clipping import is_clipped
-from synthetic_campaign import Structure, impact
+from synthetic_campaign import Structure, impact, in_memory
 
 SEEDS = range(12)
 
@@ -70,3 +71,21 @@ def test_the_noise_beside_a_pulse_says_nothing_of_its_top():
     force[100:120] += np.sin(np.pi * np.arange(20.3)[:20] / 20.3)
     assert not is_clipped(np.maximum(force, -0.5e-3), goes_one_way=True)
     assert is_clipped(np.minimum(force, 0.8), goes_one_way=True)
+
+
+@pytest.mark.parametrize("level", [0.2, 0.4, 0.7])
+def test_an_overload_in_every_impact_is_restored_and_its_error_is_in_the_variance(level):
+    structure, rng = Structure(), np.random.default_rng(8)
+    records = []
+    for height in (100.0, 60.0, 80.0):
+        signals = impact(structure, height=height)[:2]
+        signals += 2e-4 * np.abs(signals).max(axis=1, keepdims=True) * rng.standard_normal(signals.shape)
+        signals[1] = np.minimum(signals[1], level * signals[1].max())
+        records.append(signals)
+    result = frf_ipz.estimate_frfs(in_memory(records, output_dofs=("1:+z",)))
+    frfs = result.frfs
+    band = frfs.in_band((15.0, 250.0))
+    error = np.abs(frfs.values[band, 0] - structure.accelerance(frfs.s[band])[:, 0])
+    assert np.sqrt(np.mean(error**2 / frfs.variance[band, 0])) < 1.3
+    assert np.sqrt(np.mean(error**2 / frfs.variance[band, 0])) > 0.3
+    assert any("half of that counts as its error" in text for text in result.warnings)

@@ -533,6 +533,23 @@ def test_values_in_a_unit_of_no_motion_over_force_are_refused(tmp_path, unit, ke
     assert re.search(rf"frf\.txt: .*'{unit}', which is no unit of accelerance; write.*'unit' of its \[\[frf\]\]", text)
 
 
+@pytest.mark.parametrize(
+    "unit", ["counts", "ADC counts", "raw", "EU", "Eng. Units", "a.u.", "arb. units", "w.E.", "% FS", "Skt", "LSB"]
+)
+@pytest.mark.parametrize("keys", [{}, {"columns": ("frequency_hz", "real", "imag")}], ids=["header", "columns stated"])
+def test_values_without_a_scale_are_refused_in_round_brackets_too(tmp_path, unit, keys):
+    analyser_text(tmp_path, (f"Real ({unit})", f"Imag ({unit})"), *parts())
+    assert f"'{unit}', which is no unit of accelerance" in message(tmp_path, entry("frf.txt", **STATED, **keys))
+    read(tmp_path, entry("frf.txt", unit="m/s^2/N", **STATED, **keys))
+
+
+@pytest.mark.parametrize("remark", ["Hand", "Ch 1", "1", "rms", "linear", "run 3", "point 4", "left", "x: 1, y: 2"])
+def test_remarks_in_round_brackets_are_no_units(tmp_path, remark):
+    analyser_text(tmp_path, (f"Real ({remark})", f"Imag ({remark})"), *parts())
+    result = read(tmp_path, entry("frf.txt", **STATED))
+    np.testing.assert_allclose(result.frfs.values[:, 0], VALUES[:, 0], rtol=DIGITS)
+
+
 @pytest.mark.parametrize("skip_rows", [0, 1])
 def test_units_of_a_header_hold_where_columns_are_stated(tmp_path, skip_rows):
     analyser_text(tmp_path, ("Real [mm/s2/N]", "Imag [mm/s2/N]"), *parts(1e3))

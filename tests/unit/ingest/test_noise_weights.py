@@ -60,6 +60,14 @@ def test_impacts_of_equal_noise_count_as_before():
     assert not any("noisier" in mark for mark in result.records.marks)
 
 
+def test_noise_that_grows_with_the_impact_makes_none_noisier():
+    """An amplifier that chooses its range: the strongest impact has most noise, and an FRF as good as the others."""
+    rng = np.random.default_rng(6)
+    impacts = [impact(STRUCTURE, height=height, noise=NOISE * height / 100.0, rng=rng) for height in HEIGHTS]
+    marks = frf_ipz.estimate_frfs(in_memory(impacts)).records.marks
+    assert not any("noisier" in mark for mark in marks), list(marks)
+
+
 def test_noise_that_explains_little_of_the_scatter_weighs_nothing():
     """Errors of impacts beside their point are common to all lines, and none of them shows in the record's noise."""
     offsets = np.array([0.05, -0.1, 1.0])[:, None]

@@ -174,6 +174,18 @@ def test_periodic_excitation_is_transformed_in_whole_periods(tmp_path, step):
     assert np.sqrt(np.mean(error**2 / result.frfs.variance[band])) == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_lines_that_a_periodic_force_leaves_out_have_no_variance(tmp_path, seed):
+    """What stands there is the quotient of two noises."""
+    rng = np.random.default_rng(seed)
+    excited = np.arange(11, 505, 3)
+    force = np.tile(multisine(rng, 2048, excited), 9)
+    signals = np.vstack([force, respond(STRUCTURE, force, STEP_S)])[:, 4096:]
+    signals += 0.003 * rng.standard_normal(signals.shape) * signals.std(axis=1, keepdims=True)
+    variance = estimate(write(tmp_path, [signals])).frfs.variance
+    assert np.array_equal(np.flatnonzero(np.isfinite(variance[:, 0])), excited)
+
+
 def chirp(n_period):
     """Give one period of a force that sweeps up, 2 to 250 Hz: smooth from line to line."""
     t_s = np.arange(n_period) * STEP_S

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.options import IngestOptions
     from frf_ipz.ingest.recording_files import RecordingFiles
     from frf_ipz.ingest.records import Record
+    from frf_ipz.ingest.signals.periods import PeriodicForce
     from frf_ipz.ingest.survey.record_info import RecordInfo, Survey
     from frf_ipz.progress import Progress
 
@@ -56,11 +57,14 @@ class SetupAverage:
         How many independent ones those of each response are worth.
     noise : ImpactNoise, optional
         What was measured in the records themselves, where they are impacts.
+    periodic : PeriodicForce, optional
+        What comes again of the force, where all of it does so.
     """
 
     sums: SpectrumSums
     independent: FloatArray
     noise: ImpactNoise | None = None
+    periodic: PeriodicForce | None = None
 
     def take(self, rows: Sequence[int]) -> SetupAverage:
         """Take some responses.
@@ -76,7 +80,7 @@ class SetupAverage:
             Theirs.
         """
         noise = None if self.noise is None else self.noise.take(rows)
-        return SetupAverage(self.sums.take(rows), self.independent[list(rows)], noise)
+        return SetupAverage(self.sums.take(rows), self.independent[list(rows)], noise, self.periodic)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -226,7 +230,13 @@ def _pool(
     )
     noises = [part.noise for part in parts if part.noise is not None]
     independent = np.sum([part.independent for part in parts], axis=0)
-    return SetupAverage(sums, independent, add_noise(noises) if noises else None)
+    periodic = [part.periodic for part in parts if part.periodic is not None]
+    return SetupAverage(
+        sums,
+        independent,
+        add_noise(noises) if noises else None,
+        sum(periodic[1:], periodic[0]) if periodic and len(periodic) == len(parts) else None,
+    )
 
 
 def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str) -> dict[FrfLabel, _LabelEstimate]:
@@ -237,6 +247,8 @@ def _estimate(average: SetupAverage, labels: Sequence[FrfLabel], estimator: str)
     force_noise = missing_force = slow_variance = None
     if noise is None:
         variance = frf_variance(sums, average.independent)
+        if average.periodic is not None:
+            variance[average.periodic.is_noise()] = np.nan
     else:
         if estimator == "H1":
             own_power = without_force_noise(sums, noise)

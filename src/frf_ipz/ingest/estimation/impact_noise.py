@@ -63,6 +63,8 @@ class ImpactNoise:
         The same of the response, as moduli.
     cut_off : (n_outputs, n_lines) array
         What would follow the end of the response, times the modulus of the force, as moduli.
+    restored : (n_outputs, n_lines) array
+        Deviation of what was restored of an overloaded response, times the modulus of the force.
     pulse : (n_outputs, n_lines) complex array
         Transform of the force from its impact on, times its modulus.
     """
@@ -75,6 +77,7 @@ class ImpactNoise:
     missing_force: ComplexArray
     missing_response: FloatArray
     cut_off: FloatArray
+    restored: FloatArray
     pulse: ComplexArray
 
     def take(self, rows: Sequence[int]) -> ImpactNoise:
@@ -181,7 +184,7 @@ def impact_variance(sums: SpectrumSums, noise: ImpactNoise, values: ComplexArray
         measured = noise.response.T + noise.force.T * gain
         unexplained = np.where(sums.counts == 1, measured, scatter)
         unexplained += gain * (noise.force.T / counts) * (noise.force.T / power)
-        variance = unexplained * power / own_power**2
+        variance = unexplained * power / own_power**2 + (noise.restored.T / power) ** 2
         variance += gain_variance(sums, noise, values)
         is_recorded = MOST_MISSING * power >= np.abs(noise.missing_force).T
         is_recorded &= (noise.force.T > 0.0) | (power > LEAST_FORCE * power.max(axis=0))

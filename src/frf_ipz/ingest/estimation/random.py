@@ -8,7 +8,7 @@ import numpy as np
 
 from frf_ipz.ingest.estimation.averaging import average_recordings
 from frf_ipz.ingest.estimation.several_inputs import estimate_random_several
-from frf_ipz.ingest.signals.periods import transform_parts
+from frf_ipz.ingest.signals.periods import PeriodicForce, transform_parts
 from frf_ipz.ingest.signals.transients import transform_subrecords
 from frf_ipz.ingest.signals.windows import count_independent_segments, cut_segments
 
@@ -69,14 +69,17 @@ def _add_record(average: SetupAverage, info: RecordInfo, record: Record, survey:
 
 
 def _add_subrecords(average: SetupAverage, info: RecordInfo, record: Record, length: int) -> float:
-    is_steady = info.steady_part >= 0 and length % info.period == 0
-    parts = (
-        transform_parts(record.force, record.responses, length, info.steady_part)
-        if is_steady
-        else transform_subrecords(record.force, record.responses, length)
-    )
-    for force, responses in parts:
-        average.sums.add_spectra(force, responses, list(record.outputs))
+    rows = list(record.outputs)
+    if info.steady_part >= 0 and length % info.period == 0:
+        forces = []
+        for force, responses in transform_parts(record.force, record.responses, length, info.steady_part):
+            average.sums.add_spectra(force, responses, rows)
+            forces.append(force)
+        of_record = PeriodicForce.of_parts(np.array(forces))
+        average.periodic = of_record if average.periodic is None else average.periodic + of_record
+    else:
+        for force, responses in transform_subrecords(record.force, record.responses, length):
+            average.sums.add_spectra(force, responses, rows)
     return float(np.sum(record.force[: len(record.force) // length * length] ** 2))
 
 

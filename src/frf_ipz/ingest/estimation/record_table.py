@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.late_imports import import_late
+from frf_ipz.visible_text import written_out
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,7 +82,7 @@ def _make_row(record: RecordInfo, weight: float) -> tuple[object, ...]:
         record.pulse_s,
         record.used,
         weight,
-        "; ".join(record.marks),
+        written_out("; ".join(record.marks)),
         record.second_pulse_ratio,
         record.remaining_amplitude,
         record.slowest_mode_hz,

@@ -55,6 +55,13 @@ GRAD = re.compile(
     r"(?<![a-z])grad(?![a-z])", re.IGNORECASE
 )  # degrees in German, a hundredth of a right angle elsewhere
 GERMAN = _spelled(r"frequenz(?!a)|betrag|winkel|kohärenz")
+NO_SCALE = _spelled(  # what stands in the place of a unit where values have none that can be converted
+    r"(raw|adc|a/d|digital|roh)?[ _-]*(counts?|cnts?|lsbs?|ticks?|codes?|digits?|bits?|steps?|werte?)|raw|eu|e\.u\.|"
+    r"eng(ineering|\.)?[ _-]*units?|user[ _-]*units?|skt\.?|skalenteile|inkremente?|"
+    r"(a\.?u|u\.?a|w\.?e|b\.?e)\.?|arb(itrary|itr|\.)?([ _-]*units?)?|willk(ürlich|\.).*|"
+    r"unités? arbitraires?|unidades? arbitrarias?|unità arbitrarie|"
+    r"(%|percent|per ?cent|prozent|pct)([ _-]*(of)?[ _-]*(fs|full[ _-]*scale))?|fs|full[ _-]*scale"
+)
 TIME = _spelled(
     r"^(elapsed|relative|abs(olute)?|verstrichene)?[ _]*"
     r"(t|time|zeit|uhrzeit|messzeit|zeitpunkt|zeitstempel|temps|heure|horodatage|tempo|ora|orario|tiempo|hora|"

@@ -11,7 +11,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, complex_array
 from frf_ipz.errors import FileFormatError, QuantityError, did_you_mean
-from frf_ipz.ingest.formats.column_words import ANGULAR, FREQUENCY, LEVEL, frf_role
+from frf_ipz.ingest.formats.column_words import ANGULAR, FREQUENCY, LEVEL, NO_SCALE, frf_role
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import (
     COMMENT,
@@ -55,7 +55,6 @@ KNOWN = (
 DECIBELS = "magnitude_db"
 OF_VALUES = {"real", "imag", "magnitude", DECIBELS}  # columns in the unit of the FRF, or relative to it
 RATIO = re.compile(r"\(([^()]+)\)\s*\(([^()]+)\)")  # SignalCalc writes (m/s²)(N) for a ratio
-ENGINEERING = "eu"  # the unit of an analyser that was told none
 NO_UNIT = re.compile(r"h\d*(\(.*\))?|frf|lin(ear)?|point[ :]*\d*", re.IGNORECASE)  # what brackets hold beside units
 BRACKETS = re.compile(r"\[([^\[\]]*)\]")
 EMPTY_BRACKETS = re.compile(r"\[\W*\]|\(\W*\)")
@@ -266,14 +265,18 @@ def _is_stated_reference(text: str) -> bool:
 
 
 def _is_claimed(text: str, name: str, *, is_square: bool) -> bool:
-    """Tell whether brackets beside a name claim to hold a unit; square ones do, but for what is known to be none."""
+    """Tell whether brackets beside a name claim to hold a unit.
+
+    Square ones do, but for what is known to be none; round ones where it is one, or what stands in its place where
+    values have no scale. Else they hold a remark.
+    """
     if not is_stated(text) or is_number(text) or NO_UNIT.fullmatch(text):
         return False
     if "/" in text or is_unit(text):
         return True
     if frf_role(text) == name:
         return False
-    return is_square or bool(LEVEL.search(text)) or sum(map(is_unit, text.split())) > 1
+    return is_square or bool(LEVEL.search(text) or NO_SCALE.fullmatch(text)) or sum(map(is_unit, text.split())) > 1
 
 
 def _ratio_behind(field: str) -> str:
@@ -304,7 +307,7 @@ def _claimed_unit(field: str, name: str, *, is_alone: bool) -> str:
     if not is_alone or (name == DECIBELS and "/" not in field):
         return ""
     parts = [part.strip() for part in field.replace("/", " ").split()]
-    is_claimed = any(map(is_unit, parts)) or {part.lower() for part in parts} == {ENGINEERING}
+    is_claimed = any(map(is_unit, parts)) or bool(parts and all(map(NO_SCALE.fullmatch, parts)))
     return field if is_claimed else ""
 
 

@@ -43,24 +43,77 @@ def is_clipped(signal: FloatArray, *, goes_one_way: bool = False) -> bool:
     >>> is_clipped(decay), is_clipped(np.minimum(decay, 0.1))
     (False, True)
     """
+    return any(_cut_sides(signal, goes_one_way=goes_one_way))
+
+
+def find_clipped_part(signal: FloatArray) -> FloatArray:
+    """Estimate what the end of a range cut off a signal: cubics that leave and meet it with its own slopes.
+
+    Parameters
+    ----------
+    signal : (n,) array
+        As recorded.
+
+    Returns
+    -------
+    (n,) array
+        What it lacks; 0 where nothing was cut.
+
+    Examples
+    --------
+    >>> time = np.arange(1000.0)
+    >>> decay = np.exp(-time / 200) * np.sin(0.2 * time)
+    >>> part = find_clipped_part(np.minimum(decay, 0.5))
+    >>> round(float(part.max()), 2), round(float((decay - 0.5).max()), 2)
+    (0.44, 0.46)
+    """
+    part = np.zeros(len(signal))
+    for sign, is_cut in zip((1.0, -1.0), _cut_sides(signal), strict=True):
+        if is_cut:
+            part += sign * _cut_off(sign * signal)
+    return part
+
+
+def _cut_off(upward: FloatArray) -> FloatArray:
+    """Give what lies above the highest value, with the slopes beside each plateau."""
+    top = float(upward.max())
+    part = np.zeros(len(upward))
+    for start, stop in _plateau_edges(upward, EQUAL * float(np.ptp(upward))):
+        if start < 2 or stop > len(upward) - 2:
+            continue
+        rise, fall = (
+            max(float(near - far), float(top - near))
+            for near, far in (upward[[start - 1, start - 2]], upward[[stop, stop + 1]])
+        )
+        left = start - min(1.0, (top - upward[start - 1]) / rise) if rise else float(start)
+        right = stop - 1 + (min(1.0, (top - upward[stop]) / fall) if fall else 0.0)
+        length = right - left
+        u = (np.arange(start, stop) - left) / length if length else np.zeros(stop - start)
+        part[start:stop] = length * (rise * u * (1 - u) ** 2 + fall * u**2 * (1 - u))
+    return part
+
+
+def _cut_sides(signal: FloatArray, *, goes_one_way: bool = False) -> tuple[bool, bool]:
+    """Tell whether a signal was cut at its highest, and at its lowest value."""
     height = float(np.ptp(signal))
     if height == 0.0:
-        return False
+        return False, False
     step = digital_step(signal)
     if height < FEWEST_STEPS * step:
-        return False
+        return False, False
     centre = float(np.median(signal))
     # the sample beside a plateau may lie just past the corner: fine signals show the next
     sides = [(side, _find_plateaus(side, reach=1 if step else 2)) for side in (signal - centre, centre - signal)]
     is_symmetric = not step and abs(float(signal.max() + signal.min())) < EQUAL * height  # both ends of the range
     if is_symmetric and any(_has_corners(*side) for side in sides):
-        return True
-    return any(
+        return True, True
+    up, down = (
         _is_cut(*side, step)
         if side[0].max() >= FAR_SIDE * height
         else not goes_one_way and _is_far_side_cut(*side, step, height)
         for side in sides
     )
+    return up, down
 
 
 def digital_step(signal: FloatArray) -> float:
@@ -115,9 +168,14 @@ def find_saturated_peaks(peaks: FloatArray, widths: FloatArray) -> BoolArray:
 
 def _find_plateaus(upward: FloatArray, reach: int) -> list[_Plateau]:
     top = float(upward.max())
-    at_top = upward >= top - EQUAL * top
+    return [_Plateau(upward, start, stop, top, reach) for start, stop in _plateau_edges(upward, EQUAL * top)]
+
+
+def _plateau_edges(upward: FloatArray, tolerance: float) -> list[tuple[int, int]]:
+    """Give the first sample of each run of highest values, and the one after its last."""
+    at_top = upward >= float(upward.max()) - tolerance
     edges = np.flatnonzero(np.diff(at_top.astype(np.int8), prepend=0, append=0))
-    return [_Plateau(upward, start, stop, top, reach) for start, stop in edges.reshape(-1, 2)]
+    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
 
 
 def _is_far_side_cut(upward: FloatArray, plateaus: list[_Plateau], step: float, height: float) -> bool:

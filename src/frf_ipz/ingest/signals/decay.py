@@ -2,7 +2,8 @@
 
 The second half of the response is compared with the first, frequency by frequency: from the first to the second, the
 power of a mode of decay rate a falls to exp(-a T), and so does its amplitude over the whole record of length T. The
-median of neighbouring lines is the noise, since modes are narrow peaks.
+median of neighbouring lines is the noise, since modes are narrow peaks. What does not become less, by more than noise
+makes, is no mode: hum of any frequency.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ RINGING = 20.0  # times the noise: power of a mode that still rings
 NOTABLE = 0.01  # of the strongest peak, in the response or in its velocity: weaker modes do not decide on a window
 MAINS_HZ = (50.0, 60.0)
 LEAST = 1e-6  # of a mode's amplitude: what is less is no more than rounding of a recording
+CERTAIN = 3.0  # deviations by which a power has become less: chance says so of one hum in 700
 STEADY = 0.8  # of its power: what remains of hum, which does not decay
 
 
@@ -85,7 +87,8 @@ def measure_decay(response: FloatArray, step_s: float, power: int) -> Decay:
     noise = float(np.sqrt(np.mean(floor) / np.sum(np.hanning(half) ** 2)))
     early_power = maximum_filter1d(first, 5)
     is_ringing = (last == maximum_filter1d(last, 7)) & (last > RINGING * floor) & (frequency > 2.5 / (half * step_s))
-    is_ringing &= (last < early_power) & _is_notable(early_power, frequency, power)
+    is_ringing &= _is_notable(early_power, frequency, power)
+    is_ringing &= _has_decayed(early_power, last, maximum_filter1d(_noise_floor(first), 5), floor)
     ratio = np.where(is_ringing, last / np.maximum(early_power, np.finfo(float).tiny), 0.0)
     ratio[_is_hum(frequency, ratio)] = 0.0
     slowest = int(np.argmax(ratio))
@@ -154,7 +157,19 @@ def _power_of_halves(signal: FloatArray, half: int, step_s: float) -> tuple[Floa
 
 
 def _noise_floor(power: FloatArray) -> FloatArray:
-    return np.asarray(median_filter(power, NEIGHBOURS, mode="nearest") / MEDIAN)
+    return np.asarray(median_filter(power, NEIGHBOURS, mode="reflect") / MEDIAN)
+
+
+def _has_decayed(first: FloatArray, last: FloatArray, first_floor: FloatArray, last_floor: FloatArray) -> BoolArray:
+    """Tell which lines have less power in the last half than in the first, by more than what lies under them makes.
+
+    Something of the mean power F under a peak of power P changes it by sqrt(2 F / P), relative: noise, and the flanks
+    of other modes. Hum of any frequency, and a noise that goes on, stay as they are.
+    """
+    tiny = np.finfo(float).tiny
+    variance = 2.0 * (first_floor / np.maximum(first, tiny) + last_floor / np.maximum(last, tiny))
+    drop = np.log(np.maximum(first, tiny) / np.maximum(last, tiny))
+    return np.asarray((drop > 0.0) & (drop**2 > CERTAIN**2 * variance))
 
 
 def _is_notable(power: FloatArray, frequency_hz: FloatArray, derivative: int) -> BoolArray:

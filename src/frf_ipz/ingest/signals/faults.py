@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.ingest.signals.clipping import EQUAL, digital_step
+from frf_ipz.ingest.signals.pulses import pulse_extent, quiet_length
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -59,6 +60,40 @@ def find_missing_force(force: FloatArray, pulse: Pulse) -> tuple[float, ...]:
     samples = np.interp(np.arange(crossing + 1.0, length), np.arange(length), falling[:length])
     missing = np.sign(pulse.height) * samples[samples > floor][::-1]
     return tuple(float(value) for value in missing) or (0.0,)
+
+
+def find_missing_ringing(force: FloatArray, pulse: Pulse) -> tuple[float, ...]:
+    """Find what a filter may have rung before a record that begins just before its pulse.
+
+    A filter without distortion of phase, as analysers have, rings before a pulse as it does after it. Fewer quiet
+    samples before the pulse than show that it has ended do not show that nothing has been cut off.
+
+    Parameters
+    ----------
+    force : (n,) array
+        The force.
+    pulse : Pulse
+        Its pulse.
+
+    Returns
+    -------
+    tuple of float
+        The samples before the first one, a mirror image of those after the pulse; 0 where there is nothing.
+
+    Examples
+    --------
+    >>> from frf_ipz.ingest.signals.pulses import find_pulse
+    >>> force = np.concatenate([[3.0, 4.0, 3.0, -0.2, 0.1], np.zeros(200)])
+    >>> find_missing_ringing(force, find_pulse(force, threshold=0.04))
+    (0.1, -0.2)
+    >>> force = np.concatenate([np.zeros(20), force])
+    >>> find_missing_ringing(force, find_pulse(force, threshold=0.04))
+    (0.0,)
+    """
+    start, stop = pulse_extent(force, pulse)
+    quiet = quiet_length(pulse)
+    mirrored = (force - pulse.base)[2 * pulse.peak + 1 : stop][:quiet]
+    return tuple(mirrored[::-1].tolist()) if start < quiet and len(mirrored) else (0.0,)
 
 
 def find_dropout(signal: FloatArray) -> tuple[int, int]:

@@ -7,10 +7,12 @@ than that noise, about some line, hold such motion.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from frf_ipz.ingest.signals.scatter import overlapping_bands
 from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 
     from scipy import fft, special
 
-    from frf_ipz.arrays import ComplexArray, FloatArray
+    from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
 else:
     fft = import_late("scipy.fft")
     special = import_late("scipy.special")
@@ -28,6 +30,8 @@ CHANGED = 0.5  # of the mean square
 SHORTEST = 16  # samples
 FEWEST = 3  # parts without transients: their scatter is the noise
 SIDE = 8  # lines to each side that are judged together
+BAND = 64  # lines over which the noise of a force is alike
+CHANCE = 1e-6  # share of lines without a force that are taken for one with
 LEVEL = 1e-3  # probability that a part without a transient is taken for one with
 
 
@@ -98,6 +102,71 @@ def transform_parts(
     for start in range(first * length, len(force) - length + 1, length):
         samples = slice(start, start + length)
         yield fft.rfft(force[samples]), fft.rfft(responses[:, samples])
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class PeriodicForce:
+    """What the parts of periodic records tell of their force: what comes again, and what does not.
+
+    Parameters
+    ----------
+    mean_power : (n_lines,) array
+        Squared modulus of the mean over the parts of a record times their number, summed over the records.
+    scatter : (n_lines,) array
+        Squared moduli of what differs from that mean, summed over all parts.
+    n_records, degrees : int
+        Records, and parts less one for each.
+    """
+
+    mean_power: FloatArray
+    scatter: FloatArray
+    n_records: int
+    degrees: int
+
+    @classmethod
+    def of_parts(cls, spectra: ComplexArray) -> Self:
+        """Measure one record.
+
+        Parameters
+        ----------
+        spectra : (n_parts, n_lines) complex array
+            Transforms of the force.
+
+        Returns
+        -------
+        PeriodicForce
+            Of this record.
+        """
+        mean = spectra.mean(axis=0)
+        return cls(
+            mean_power=len(spectra) * np.abs(mean) ** 2,
+            scatter=np.sum(np.abs(spectra - mean) ** 2, axis=0),
+            n_records=1,
+            degrees=len(spectra) - 1,
+        )
+
+    def __add__(self, record: Self) -> Self:
+        return type(self)(
+            **{field.name: getattr(self, field.name) + getattr(record, field.name) for field in fields(self)}
+        )
+
+    def is_noise(self) -> BoolArray:
+        """Tell on which lines the force is noise alone, as lines between those that a generator excites.
+
+        Noise alone has the power of its scatter in the means too. That is pooled over the lines of a band, so that the
+        power of R means over it is distributed as a gamma variable of R degrees of freedom.
+
+        Returns
+        -------
+        (n_lines,) bool array
+            False where the means have more power than chance gives to one line in a million.
+        """
+        if not self.degrees:
+            return np.zeros(len(self.scatter), bool)
+        bands, shares = overlapping_bands(len(self.scatter), BAND)
+        quiet = np.median(self.scatter[bands], axis=1) / special.gammaincinv(self.degrees, 0.5)
+        noise = np.bincount(bands.ravel(), (shares * quiet[:, None]).ravel(), len(self.scatter))
+        return np.asarray(self.mean_power <= noise * special.gammainccinv(self.n_records, CHANCE))
 
 
 def first_steady_part(force: FloatArray, responses: FloatArray, length: int) -> int:

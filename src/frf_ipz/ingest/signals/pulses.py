@@ -123,10 +123,26 @@ def pulse_extent(force: FloatArray, pulse: Pulse, *, significance: float = 4.0) 
     """
     floor = max(significance * pulse.noise, 1e-5 * abs(pulse.height))
     loud = np.abs(force - pulse.base) > floor
-    gap = max(6, int(3 * pulse.width))
+    gap = quiet_length(pulse)
     samples_before = _last_before_gap(loud[pulse.peak :: -1], gap)
     samples_after = _last_before_gap(loud[pulse.peak :], gap)
     return pulse.peak - samples_before, pulse.peak + samples_after + 1
+
+
+def quiet_length(pulse: Pulse) -> int:
+    """Give how many samples must be quiet for a pulse and its ringing to have ended.
+
+    Parameters
+    ----------
+    pulse : Pulse
+        The pulse.
+
+    Returns
+    -------
+    int
+        A filter rings through zero faster than that.
+    """
+    return max(6, int(3 * pulse.width))
 
 
 def force_band(pulse: FloatArray) -> float:

@@ -8,7 +8,13 @@ import numpy as np
 
 from frf_ipz.ingest.signals.clipping import digital_step, is_clipped
 from frf_ipz.ingest.signals.decay import Decay, measure_decay
-from frf_ipz.ingest.signals.faults import MOST_MISSING, find_dropout, find_missing_force, is_settling
+from frf_ipz.ingest.signals.faults import (
+    MOST_MISSING,
+    find_dropout,
+    find_missing_force,
+    find_missing_ringing,
+    is_settling,
+)
 from frf_ipz.ingest.signals.periods import find_period
 from frf_ipz.ingest.signals.pulses import find_pulse, force_band, pulse_extent
 from frf_ipz.ingest.signals.spikes import find_spikes, in_one_response
@@ -123,6 +129,7 @@ def check_impact(
         ),
         channel_faults=channel_faults,
         missing_force=missing_force,
+        missing_ringing=find_missing_ringing(force, pulse),
         lacks_most=lacks_most,
         spikes=spikes,
         remarks=(

@@ -247,23 +247,36 @@ def _weighed(
             record,
             noise_weights=tuple(tuple(np.interp(points, np.arange(n_lines), row[impact]).tolist()) for row in weights),
             noise_scales=tuple(float(scale[impact]) for scale in scales),
-            remarks=(*record.remarks, *_find_noisy(files, [row[impact] for row in weights])),
+            remarks=(*record.remarks, *_find_noisy(files, spectra, agreeing, weights, impact)),
         )
         for impact, record in enumerate(records)
     ]
 
 
-def _find_noisy(files: RecordingFiles, weights: Sequence[FloatArray]) -> tuple[str, ...]:
-    """Say which responses of an impact count little for their noise."""
-    shares = [
-        (channel.column, float(np.median(row)))
-        for channel, row in zip(files.test.output_channels, weights, strict=True)
-    ]
-    return tuple(
-        f"{column} is noisier than in the other impacts: it counts {100 * share:.2g} % of a usual one"
-        for column, share in shares
-        if share < LITTLE
-    )
+def _find_noisy(
+    files: RecordingFiles,
+    spectra: ImpactSpectra,
+    agreeing: Sequence[Sequence[int]],
+    weights: Sequence[FloatArray],
+    impact: int,
+) -> tuple[str, ...]:
+    """Say which responses of an impact count little for their noise.
+
+    Noise that is louder in a stronger impact, by as much, takes nothing from what that impact tells of an FRF.
+    """
+    power = np.abs(spectra.force) ** 2
+    texts = []
+    for channel, impacts, row in zip(files.test.output_channels, agreeing, weights, strict=True):
+        if impact not in impacts:
+            continue
+        weighed = row * power
+        total = np.maximum(weighed[list(impacts)].mean(axis=0), np.finfo(float).tiny)
+        share = float(np.median(weighed[impact] / total))
+        if max(share, float(np.median(row[impact]))) < LITTLE:
+            texts.append(
+                f"{channel.column} is noisier than in the other impacts: it counts {100 * share:.2g} % of a usual one"
+            )
+    return tuple(texts)
 
 
 def _compare_output(
@@ -395,11 +408,11 @@ def _difference(spectra: ImpactSpectra, comparison: OutputComparison, place: tup
     """Say by how much one response of an impact differs from what those of the others make of its force."""
     impact, output = place
     response, expected = spectra.responses[impact, output], comparison.frf * spectra.force[impact]
-    size = np.maximum(np.abs(expected), np.finfo(float).tiny)
-    difference = np.abs(response - expected) / size
-    usual = np.median(np.sqrt(comparison.scatter) / size)
+    size = max(float(np.sum(np.abs(expected) ** 2)), np.finfo(float).tiny)
+    difference = np.sqrt(np.sum(np.abs(response - expected) ** 2) / size)
+    usual = np.sqrt(np.sum(comparison.scatter) / size)
     return (
-        f"it is {100 * np.median(difference):.2g} % off what the other impacts make of its force (median over the "
+        f"it is {100 * difference:.2g} % off what the other impacts make of its force (root of mean square over the "
         f"lines, where noise and their own scatter are {100 * usual:.2g} %)"
     )
 

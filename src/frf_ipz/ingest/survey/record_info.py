@@ -73,6 +73,8 @@ class RecordInfo:
         It enters them with all channels, whatever is wrong with them.
     missing_force : tuple of float
         Samples of the force that its record lacks because it begins within the pulse, N.
+    missing_ringing : tuple of float
+        What its filter may have rung before its first sample, where it begins just before the pulse, the same way.
     lacks_most : bool
         Its record begins so late in the pulse that nothing is known of the force.
     noise_weights : tuple of tuples of float
@@ -122,6 +124,7 @@ class RecordInfo:
     used: bool = True
     keeps_channels: bool = False
     missing_force: tuple[float, ...] = (0.0,)
+    missing_ringing: tuple[float, ...] = (0.0,)
     lacks_most: bool = False
     noise_weights: tuple[tuple[float, ...], ...] = ()
     noise_scales: tuple[float, ...] = ()

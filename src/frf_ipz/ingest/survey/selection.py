@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.survey.record_info import RecordInfo
 
 MOST_NAMES = 3  # records that a message names
+RESTORED = "what was cut off is estimated from the slopes beside it, and half of that counts as its error"
 SAME_STEP = 1e-3  # relative difference up to which two files have one time step
 
 
@@ -150,7 +151,8 @@ def select_records(records: Sequence[RecordInfo], options: IngestOptions) -> Sel
     for record in fallbacks:
         reasons = record.faults or tuple(dict(record.channel_faults).values())
         reason = f"although it is bad ({'; '.join(reasons)}): no better record at {record.setup.input_dof}"
-        warnings.append(f"{record.name} is used {reason}")
+        restored = f"; {RESTORED}" if any("overload" in text for _, text in record.channel_faults) else ""
+        warnings.append(f"{record.name} is used {reason}{restored}")
     decided_records = [
         replace(record, used=True, keeps_channels=record.keeps_channels or not record.used_outputs)
         if record in fallbacks

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, fields, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ from frf_ipz.export.parquet import write_table
 from frf_ipz.frf import FrfSet
 from frf_ipz.ingest.estimate import estimate_from
 from frf_ipz.late_imports import import_late
+from frf_ipz.pipeline.config import StageOptions
 from frf_ipz.pipeline.stages.mismatch import corrections
 from frf_ipz.runs.digests import digest_arrays
 
@@ -21,10 +22,14 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.modes import ModalParameters
     from frf_ipz.pipeline.stage_runner import StageRunner
+    from frf_ipz.progress import Progress
     from frf_ipz.runs.folder import Writers
     from frf_ipz.structure import Geometry
 else:
     fit_modes = import_late("frf_ipz.identification.fit", "fit_modes")
+
+
+WITHOUT_MODEL = (("diagnose", "run"), ("export", "files"))  # what can be said where there is none
 
 
 def ingest(runner: StageRunner) -> FrfEstimate:
@@ -44,13 +49,35 @@ def ingest(runner: StageRunner) -> FrfEstimate:
     if runner.inputs.fe_model is None and geometry is not None:
         _outline(runner, geometry)
     options = runner.inputs.options.ingest
+    said = {"options": asdict(options), "test": repr(runner.inputs.test)}
     files = {name: runner.inputs.digests[name] for name in runner.inputs.measurement_names}
+    idle = () if runner.inputs.fe_model is not None else _idle_without_model(runner.inputs.options)
+
+    def estimate(progress: Progress) -> FrfEstimate:
+        estimate = estimate_from(runner.recordings, options, progress)
+        return replace(estimate, warnings=(*estimate.warnings, *idle)) if idle else estimate
+
     return runner.stage(
         "ingest",
-        {"options": asdict(options), "test": repr(runner.inputs.test), "files": files},
-        lambda progress: estimate_from(runner.recordings, options, progress),
+        {**said, "files": files, **({"idle": idle} if idle else {})},
+        estimate,
         _files_of_ingest,
     )
+
+
+def _idle_without_model(options: StageOptions) -> tuple[str, ...]:
+    """Name keys of the sections whose stages run only where there is an FE model."""
+    default, texts = StageOptions(), []
+    for section in ("diagnose", "reduce", "update", "export"):
+        chosen, usual = getattr(options, section), getattr(default, section)
+        idle = [
+            field.name
+            for field in fields(chosen)
+            if getattr(chosen, field.name) != getattr(usual, field.name) and (section, field.name) not in WITHOUT_MODEL
+        ]
+        if idle:
+            texts.append(f"[{section}] {', '.join(idle)}")
+    return (f"{'; '.join(texts)}: no effect without an FE model",) if texts else ()
 
 
 def fit(
@@ -107,6 +134,12 @@ def _files_of_ingest(result: FrfEstimate) -> Writers:
     return {**files, "coherence.parquet": partial(write_table, tables.coherence_table(result))}
 
 
+def _delays_s(frfs: FrfSet, result: ModalFit) -> list[float]:
+    """Give the delay of each FRF that the fit took off, s."""
+    delays = dict(zip(result.misfit["frf"], result.misfit["delay_s"], strict=True))
+    return [float(delays.get(number, 0.0)) for number in range(frfs.n_frfs)]
+
+
 def _files_of_fit(frfs: FrfSet, result: ModalFit) -> Writers:
     """Write the modes; and, where there are FRFs, them, their zeros and what the fit leaves of them."""
     scale_is_known = frfs.unknown_scale == "none"
@@ -118,7 +151,7 @@ def _files_of_fit(frfs: FrfSet, result: ModalFit) -> Writers:
         return files
     return {
         **files,
-        "frf.parquet": partial(write_table, tables.frf_table(result.without_window(frfs))),
+        "frf.parquet": partial(write_table, tables.frf_table(result.without_window(frfs), _delays_s(frfs, result))),
         "zeros.parquet": partial(write_table, tables.zero_table(result)),
         "fit.parquet": partial(write_table, tables.misfit_table(result)),
     }
