@@ -2,9 +2,9 @@
 
 In those modes ``(p^2 I + p C + diag(w^2)) x = 0``, where C is nearly diagonal. Row by row that is a fixed point, which
 is reached by a few products of matrices: Jacobi's method, with the own component of each mode held at 1. Its result is
-that of the eigenvalue problem of twice the order to rounding. Modes so close that damping mixes them, or heavily damped,
-it does not find: theirs is the eigenvalue problem of what is orthogonal to all others. Where that fails, and of so few
-modes that it costs no more, the whole problem is solved.
+that of the eigenvalue problem of twice the order to rounding. Modes so close that damping mixes them, or that are
+damped heavily, it does not find: theirs is the eigenvalue problem of what is orthogonal to all others. Where that
+fails, and of so few modes that it costs no more, the whole problem is solved.
 """
 
 from __future__ import annotations
