@@ -2,15 +2,16 @@
 
 In those modes ``(p^2 I + p C + diag(w^2)) x = 0``, where C is nearly diagonal. Row by row that is a fixed point, which
 is reached by a few products of matrices: Jacobi's method, with the own component of each mode held at 1. Its result is
-that of the eigenvalue problem of twice the order to rounding, or the eigenvalue problem is solved: of modes so close
-that damping mixes them, of heavy damping, and of so few modes that it costs no more.
+that of the eigenvalue problem of twice the order to rounding. Modes so close that damping mixes them, or that are
+damped heavily, it does not find: theirs is the eigenvalue problem of what is orthogonal to all others. Where that
+fails, and of so few modes that it costs no more, the whole problem is solved.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from frf_ipz.arrays import ComplexArray, FloatArray
+from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 STEPS = 80  # of the iteration: of the few modes that take so many, the work is below that of the eigenvalue problem
 FEW = 16  # modes, up to which the eigenvalue problem costs less
@@ -103,20 +104,31 @@ def _of_damped(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, Co
     found = _from_undamped(squares, rates) if len(squares) > FEW else None
     if found is None:
         return _by_eigenvalues(squares, rates)
-    poles, vectors = found
+    places, poles, vectors = found
     slope = 2 * poles * np.sum(vectors**2, axis=0) + np.sum(vectors * (rates @ vectors), axis=0)
-    return poles, vectors, vectors / slope
+    if len(places) == len(squares):
+        return poles, vectors, vectors / slope
+    rest = _beside_found(squares, rates, (poles, vectors, slope), np.delete(np.arange(len(squares)), places))
+    if rest is None:
+        return _by_eigenvalues(squares, rates)
+    return (
+        np.concatenate([poles, rest[0]]),
+        np.concatenate([vectors, rest[1]], axis=1),
+        np.concatenate([vectors / slope, rest[2]], axis=1),
+    )
 
 
-def _from_undamped(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, ComplexArray] | None:
-    """Iterate; None where it does not end at as many different modes."""
+def _from_undamped(squares: FloatArray, rates: FloatArray) -> tuple[IntArray, ComplexArray, ComplexArray] | None:
+    """Iterate: the modes that come to an end, each once, with their poles and vectors; None where there is none."""
     own_rates = np.diag(rates)
-    if not (squares > own_rates**2 / 4).all() or not np.array_equal(rates, rates.T):
+    columns = np.flatnonzero(squares > own_rates**2 / 4)
+    if not len(columns) or not np.array_equal(rates, rates.T):
         return None
     coupling = rates - np.diag(own_rates)
     order = len(squares)
     poles, vectors = np.zeros(order, complex), np.eye(order, dtype=complex)
-    columns, moving = np.arange(order), vectors
+    is_found = np.zeros(order, bool)
+    moving = np.ascontiguousarray(vectors[:, columns])
     for _ in range(STEPS):
         forces = (coupling @ moving.view(float)).view(complex)
         own = columns, np.arange(len(columns))
@@ -132,21 +144,63 @@ def _from_undamped(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray
             steps = np.abs((forces - moving).view(float)).max(axis=0).reshape(-1, 2).max(axis=1)
         vectors[:, columns], poles[columns] = forces, latest
         is_open = ~(steps <= ROUNDING)
+        is_found[columns] = ~is_open
         if not is_open.any():
             break
         columns, moving = columns[is_open], np.ascontiguousarray(forces[:, is_open])
-    else:
-        return None
-    return (poles, vectors) if (poles.imag > 0).all() and _are_different(poles, vectors, rates) else None
+    places = np.flatnonzero(is_found & (poles.imag > 0))
+    places = places[_are_different(poles[places], np.ascontiguousarray(vectors[:, places]), rates)]
+    return (places, poles[places], np.ascontiguousarray(vectors[:, places])) if len(places) else None
 
 
-def _are_different(poles: ComplexArray, vectors: ComplexArray, rates: FloatArray) -> bool:
+def _are_different(poles: ComplexArray, vectors: ComplexArray, rates: FloatArray) -> BoolArray:
+    """Tell which modes were found once: the others are not orthogonal to all."""
     inertial = vectors.T @ vectors
     damped = vectors.T @ (rates @ vectors.view(float)).view(complex)
     products = np.abs((poles[:, None] + poles) * inertial + damped)
     slopes = np.diag(products)
     off = products - np.diag(slopes)
-    return bool((off <= COUPLED * np.sqrt(slopes[:, None] * slopes)).all())
+    return np.asarray((off <= COUPLED * np.sqrt(slopes[:, None] * slopes)).all(axis=1))
+
+
+def _beside_found(
+    squares: FloatArray,
+    rates: FloatArray,
+    found: tuple[ComplexArray, ComplexArray, ComplexArray],
+    others: IntArray,
+) -> tuple[ComplexArray, ComplexArray, ComplexArray] | None:
+    """Poles and vectors of the modes that are not found, from what is orthogonal to all that are; None if that is not.
+
+    With ``v = (x, p x)`` the problem is ``A v = p v``, and ``S = ((C, I), (I, 0))`` makes A symmetric: v of different
+    poles are orthogonal under S. What is orthogonal to the v that are known has the order of the others.
+    """
+    top = float(squares.max())
+    scale, count = np.sqrt(top), len(others)
+    poles, vectors, slope = found[0] / scale, found[1], found[2] / scale
+    damping, stiffness = rates / scale, squares / top
+    known = np.concatenate([vectors, poles * vectors])
+    by_place = np.concatenate([(poles * vectors + damping @ vectors)[others], vectors[others]])
+    free = -2 * (known @ (by_place / slope).T).real
+    free[others, np.arange(count)] += 1.0
+    free[len(squares) + others, count + np.arange(count)] += 1.0
+    motion, velocity = free[: len(squares)], free[len(squares) :]
+    mixed = motion.T @ velocity
+    metric = motion.T @ damping @ motion + mixed + mixed.T
+    try:
+        values, turned = np.linalg.eig(
+            np.linalg.solve(metric, velocity.T @ velocity - motion.T @ (stiffness[:, None] * motion))
+        )
+        left = np.linalg.inv(metric @ turned)
+    except np.linalg.LinAlgError:
+        return None
+    chosen = np.concatenate([np.flatnonzero(values.imag > 0), np.flatnonzero(values.imag == 0)])
+    own = values[chosen].astype(complex)
+    right = (motion @ turned[:, chosen]).astype(complex)
+    elastic, inertial, damped = stiffness[:, None] * right, own**2 * right, own * (damping @ right)
+    size = sum(np.linalg.norm(part, axis=0) for part in (elastic, inertial, damped))
+    if not (np.linalg.norm(elastic + inertial + damped, axis=0) <= COUPLED * size).all():
+        return None
+    return own * scale, right, (motion @ left[chosen].T).astype(complex) / scale
 
 
 def _by_eigenvalues(squares: FloatArray, rates: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

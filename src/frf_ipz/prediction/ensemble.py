@@ -16,7 +16,8 @@ from frf_ipz.numerics.pole_sums import PoleSums
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-FRFS_AT_ONCE, LINES_AT_ONCE = 64, 128
+FRFS_AT_ONCE = 256  # whose terms of all members are in memory
+VALUES_AT_ONCE = 8192  # of a member: lines times FRFs
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,15 +79,16 @@ class ModelEnsemble:
         Yields
         ------
         slice, slice, (m, lines, frfs) complex array
-            Lines, FRFs, and their values, m/N.
+            Lines, FRFs, and their values, m/N, which the caller may change.
         """
         sums = PoleSums.over([poles for poles, _, _ in self.roots], s)
         for first_frf in range(0, len(outputs), FRFS_AT_ONCE):
             frfs = slice(first_frf, first_frf + FRFS_AT_ONCE)
             residues = [(right.T @ outputs[frfs].T) * (left.T @ forces[frfs].T) for _, right, left in self.roots]
             terms = [sums.terms(member, of_member) for member, of_member in enumerate(residues)]
-            for first_line in range(0, len(s), LINES_AT_ONCE):
-                lines = slice(first_line, first_line + LINES_AT_ONCE)
+            lines_at_once = VALUES_AT_ONCE // len(outputs[frfs])
+            for first_line in range(0, len(s), lines_at_once):
+                lines = slice(first_line, first_line + lines_at_once)
                 values = np.empty((len(terms), len(s[lines]), len(outputs[frfs])), complex)
                 for member, of_member in enumerate(terms):
                     np.matmul(sums.factors(member, lines), of_member, out=values[member])

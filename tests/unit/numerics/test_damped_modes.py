@@ -48,8 +48,10 @@ def test_lightly_coupled_modes_need_no_eigenvalue_problem(monkeypatch):
 def test_a_mode_that_is_found_twice_is_refused():
     squares, rates = model(coupling=0.3)
     poles, vectors, _ = damped_modes(squares, rates)
-    assert module._are_different(poles, vectors, rates)
-    assert not module._are_different(poles[[0, 0]], np.ascontiguousarray(vectors[:, [0, 0]]), rates)
+    assert module._are_different(poles, vectors, rates).all()
+    twice = [0, 1, 0]
+    is_alone = module._are_different(poles[twice], np.ascontiguousarray(vectors[:, twice]), rates)
+    assert is_alone.tolist() == [False, True, False]
 
 
 def test_an_overdamped_mode_has_two_real_poles():
@@ -79,4 +81,20 @@ def test_modes_that_are_found_by_iteration_give_the_receptance(monkeypatch):
     squares, rates = model(coupling=0.3)
     monkeypatch.setattr(module, "_by_eigenvalues", None)
     poles, vectors, left_vectors = damped_modes(squares, rates)
+    assert_receptance(squares, rates, poles, vectors, left_vectors)
+
+
+@pytest.mark.parametrize("case", ["mixed by damping", "overdamped"])
+def test_modes_that_the_iteration_does_not_find_follow_from_what_is_orthogonal_to_the_others(case, monkeypatch):
+    squares, rates = model(coupling=0.3, closest=1e-3 if case == "mixed by damping" else 1.0)
+    if case == "overdamped":
+        rates[0, 0] = 4 * np.sqrt(squares[0])
+    expected, _, _ = module._by_eigenvalues(squares, rates)
+    found = module._from_undamped(squares, rates)[0]
+    assert 0 < len(found) < ORDER
+    monkeypatch.setattr(module, "_by_eigenvalues", None)
+    poles, vectors, left_vectors = damped_modes(squares, rates)
+    assert_allclose(np.sort_complex(poles), np.sort_complex(expected), rtol=1e-10)
+    assert residual(squares, rates, poles, vectors).max() < 1e-10
+    left_vectors = left_vectors * np.where(poles.imag > 0, 1.0, 0.5)
     assert_receptance(squares, rates, poles, vectors, left_vectors)

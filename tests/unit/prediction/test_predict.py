@@ -15,7 +15,7 @@ from frf_ipz.fe.response import compute_frfs
 from frf_ipz.numerics.damped_modes import receptance_roots
 from frf_ipz.prediction import ensemble as ensembles
 from frf_ipz.prediction.advice import WIDE_DB, wide_bands
-from frf_ipz.prediction.predict import predict_frfs
+from frf_ipz.prediction.predict import BAND, _limits, predict_frfs
 from frf_ipz.prediction.prediction import Prediction
 from frf_ipz.quantities import FrfQuantity
 from frf_ipz.rational import ZeroSet
@@ -235,3 +235,9 @@ def test_a_band_on_one_side_is_given_by_both_sides(low_db, high_db, expected):
         zero_std=np.zeros((0, 2)),
     )
     assert prediction.band_db_text(0) == expected
+
+
+@pytest.mark.parametrize("count", [1, 2, 37, 200])
+def test_limits_of_a_band_are_quantiles(count):
+    magnitude = np.random.default_rng(count).chisquare(2, (count, 3, 4))
+    assert_allclose(_limits(magnitude.copy()), np.quantile(magnitude, BAND, axis=0), rtol=1e-12)

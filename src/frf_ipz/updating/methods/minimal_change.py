@@ -21,7 +21,7 @@ from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.low_rank import factorise
 from frf_ipz.updating.along_structure import part_table
 from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
-from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble, draw_parameters
+from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble, draw_whitened, parameters_of
 from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, frame_of, modal_frame, modal_parameters
 from frf_ipz.updating.minimal_change.outliers import EXCLUDED_STD, contradicted_targets, unmet_targets
@@ -46,7 +46,7 @@ SMALLEST_NOISE = 1e-6  # relative standard deviation of a frequency: none is mea
 OF_DAMPING = 1.0  # change of the logarithm of a modulus by damping, from which damping makes a root
 UNKNOWN_STD = 1e15  # relative, of what is no target: however far its root runs, and with it what moves it
 STEPS_BACK = 16  # to the nominal model: so many that roots keep the greater part of their vectors over each
-MASS_DRAWS = 200  # of masses of sensors
+LEAST_DRAWS = 200  # to judge masses of sensors by
 CHANCE = 0.05  # that of sensors without a mass any one is held to weigh less than nothing, and left out
 SHIFTED = 0.1  # standard deviations of a modulus from which the stiffness is updated again for the change by damping
 
@@ -94,12 +94,16 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Update:
-    """An update of both phases: its targets, what is left open, what was done, and which targets were excluded."""
+    """An update of both phases: its targets, what is left open, what was done, and which targets were excluded.
+
+    What was drawn of its stiffness and mass to judge masses by is kept with the source of randomness after that.
+    """
 
     problem: UpdateProblem
     posterior: Posterior
     history: tuple[tuple[str, PhaseResult], ...]
     excluded: IntArray
+    drawn: tuple[FloatArray, np.random.Generator] | None = None
 
     @cached_property
     def model(self) -> ReducedModel:
@@ -125,11 +129,11 @@ def _solve_with_masses(
         basis = problem.basis
         if basis is None or not basis.attached:
             return update_of
-        attached = np.array(basis.attached)
-        drawn = draw_parameters(update_of.posterior, np.random.default_rng(options.seed), MASS_DRAWS)
-        below = attached[surely_below(drawn[:, attached])]
+        attached, rng = np.array(basis.attached), np.random.default_rng(options.seed)
+        drawn = draw_whitened(update_of.posterior, rng, max(options.ensemble, LEAST_DRAWS))
+        below = attached[surely_below(parameters_of(update_of.posterior, drawn)[:, attached])]
         if not len(below):
-            return update_of
+            return replace(update_of, drawn=(drawn, rng))
         problem = replace(problem, basis=basis.without_attached(below.tolist()))
         del update_of  # before another one takes as much memory
 
@@ -285,7 +289,10 @@ def _modal_rows(problem: UpdateProblem, frame: ModalFrame) -> dict[int, tuple[Fl
 def _updated(update_of: _Update, options: UpdateOptions) -> UpdatedModel:
     problem, posterior = update_of.problem, update_of.posterior
     converged = posterior.stiffness_result.converged and posterior.damping_result.converged
-    ensemble, draws = draw_ensemble(posterior, np.random.default_rng(options.seed), options.ensemble)
+    drawn, rng = update_of.drawn or (None, np.random.default_rng(options.seed))
+    if drawn is not None and len(drawn) != options.ensemble:
+        drawn, rng = None, np.random.default_rng(options.seed)
+    ensemble, draws = draw_ensemble(posterior, rng, options.ensemble, drawn=drawn)
     return UpdatedModel(
         model=update_of.model,
         nominal=problem.model,

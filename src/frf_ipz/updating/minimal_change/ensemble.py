@@ -80,7 +80,9 @@ class Posterior:
         return with_damping(roots, tracked, *self._in_frame()).values(count)
 
 
-def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:
+def draw_ensemble(
+    posterior: Posterior, rng: np.random.Generator, count: int, *, drawn: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
     """Draw models.
 
     Parameters
@@ -91,6 +93,8 @@ def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) ->
         Source of randomness.
     count : int
         Number of models.
+    drawn : (count, k) array, optional
+        Whitened parameters of their stiffness and mass, where `draw_whitened` has drawn as many with that source.
 
     Returns
     -------
@@ -99,14 +103,15 @@ def draw_ensemble(posterior: Posterior, rng: np.random.Generator, count: int) ->
     theta : (count, p) array
         Parameters of their stiffness and mass.
     """
-    theta, mass, stiffness = _draw_stiffness(posterior, rng, count)
+    whitened = draw_whitened(posterior, rng, count) if drawn is None else drawn
+    theta, mass, stiffness = _stiffness_of(posterior, whitened)
     damping = _draw_damping(posterior, rng, count)
     frame = posterior.frame
     return np.stack([frame.from_modal(mass), frame.from_modal(damping), frame.from_modal(stiffness)], axis=1), theta
 
 
-def draw_parameters(posterior: Posterior, rng: np.random.Generator, count: int) -> FloatArray:
-    """Draw parameters of stiffness and mass.
+def draw_whitened(posterior: Posterior, rng: np.random.Generator, count: int) -> FloatArray:
+    """Draw unit normal numbers of the parameters of stiffness and mass.
 
     Parameters
     ----------
@@ -119,18 +124,33 @@ def draw_parameters(posterior: Posterior, rng: np.random.Generator, count: int) 
 
     Returns
     -------
-    (count, p) array
+    (count, k) array
         Whether or not they make a structure.
     """
-    phase, result = posterior.stiffness, posterior.stiffness_result
-    return unwhiten(phase.terms, result.scales[:-1], _draw(phase, result, rng, count))
+    return _draw(posterior.stiffness, posterior.stiffness_result, rng, count)
 
 
-def _draw_stiffness(
-    posterior: Posterior, rng: np.random.Generator, count: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def parameters_of(posterior: Posterior, whitened: FloatArray) -> FloatArray:
+    """Give parameters of stiffness and mass from their unit normal numbers.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Of an update.
+    whitened : (count, k) array
+        As drawn.
+
+    Returns
+    -------
+    (count, p) array
+        The parameters.
+    """
+    return unwhiten(posterior.stiffness.terms, posterior.stiffness_result.scales[:-1], whitened)
+
+
+def _stiffness_of(posterior: Posterior, drawn: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     phase, result = posterior.stiffness, posterior.stiffness_result
-    whitened, theta, mass, stiffness = _with_positive_mass(posterior, _draw(phase, result, rng, count))
+    whitened, theta, mass, stiffness = _with_positive_mass(posterior, drawn)
     # the poles predicted by the linear step are imposed: far from the mean, second-order terms would blur them
     poles = np.flatnonzero(phase.target_roots.frf < 0)
     sensitivity = np.empty((len(poles), result.linear.ends[-1] - result.linear.ends[0]))
