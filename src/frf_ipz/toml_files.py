@@ -312,8 +312,8 @@ def _explain(error: Any, options_type: type) -> str:
         last = error["loc"][-1]
         return f"value {last + 1} is missing" if isinstance(last, int) else f"the key '{last}' is missing"
     if error["type"] == "dataclass_type":
-        known = ", ".join(field.name for field in fields(_dataclass_at(options_type, error["loc"])))
-        return f"must be a table {{ ... }} with keys of {known}; given is {error['input']!r}"
+        keys = ", ".join(field.name for field in fields(_dataclass_at(options_type, error["loc"])))
+        return f"must be a table {{ ... }} with keys of {keys}; given is {error['input']!r}"
     message = str(error["msg"]).removeprefix("Value error, ").replace("Input should", "must")
     value = error.get("input")
     return f"{message[:1].lower()}{message[1:]}; given is {value!r}"

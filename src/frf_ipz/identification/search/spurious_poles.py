@@ -63,7 +63,7 @@ def find_spurious_poles(
     for number, pole in enumerate(poles):
         distance = np.abs(poles.imag - pole.imag)
         reason = "" if is_exact[number] else _same_peak_reason(number, poles, distance, significance)
-        reason = reason or _side_band_reason(number, poles, distance, significance, energy)
+        reason = reason or _side_band_reason(number, poles, distance, energy)
         reason = reason or _drift_reason(number, poles, distance / (width + width[number]), significance, drift_reach)
         if not reason and significance[number] < DEMANDED and not goodness.is_needed[number]:
             reason = (
@@ -123,9 +123,7 @@ def _same_peak_reason(number: int, poles: ComplexArray, distance: FloatArray, si
     return f"lies under the peak at {abs(strong) / (2 * np.pi):.6g} Hz and is far weaker: an error of that mode"
 
 
-def _side_band_reason(
-    number: int, poles: ComplexArray, distance: FloatArray, significance: FloatArray, energy: FloatArray
-) -> str:
+def _side_band_reason(number: int, poles: ComplexArray, distance: FloatArray, energy: FloatArray) -> str:
     carriers = np.flatnonzero(
         (distance < SIDE_BAND_DISTANCE * poles[number].imag) & (energy[number] < SIDE_BAND_ENERGY * energy)
     )
