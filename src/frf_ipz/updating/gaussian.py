@@ -850,6 +850,28 @@ def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: Fl
     return scales
 
 
+def log_evidence(linear: Linearised, terms: Sequence[PriorTerm], scales: FloatArray) -> float:
+    """Give the logarithm of the evidence for some standard deviations of the prior terms, with their own prior.
+
+    Parameters
+    ----------
+    linear : Linearised
+        The data.
+    terms : sequence of PriorTerm
+        The terms; the last one may be the slack.
+    scales : (t,) array
+        Their standard deviations.
+
+    Returns
+    -------
+    float
+        But for a constant that the same data have whatever the terms.
+    """
+    free = np.array([term.scale_uncertainty > 0 for term in terms])
+    logs = np.log(np.maximum(scales, np.finfo(float).tiny))[free]
+    return -_ScaleSearch(linear, terms, free, scales).evidence(logs).value
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _ScaleSearch:
     """Minus the logarithm of the evidence, by the logarithms of the free scales.

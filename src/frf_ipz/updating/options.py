@@ -25,7 +25,7 @@ class UpdateOptions:
         ``parts`` (those of the FE model, and generic changes beyond) or ``diagnosis`` (what a diagnosis has found, and
         nothing else; needs ``[diagnose] apply = true``).
     mass : bool
-        Let the mass change too (minimal-change).
+        Let the masses of all parts change too, and not only those at single nodes (minimal-change).
     damping : bool
         Change the damping after the stiffness.
     max_iterations : int, optional

@@ -9,12 +9,15 @@ built here, and a diagnosis may bring its own.
   segments that are softer or stiffer than modelled.
 - Every symmetric change of the reduced stiffness, relative to ``omega_i omega_j`` in mass-normalised modal
   coordinates: what the parts cannot express, and all there is where a model has no parts.
+- Masses at nodes, which a structure has and its model lacks, or the other way round. A stiffness that moves the same
+  poles and zeros bends the shapes between measured points otherwise. All nodes have one standard deviation, of which
+  the data tell.
 - Factors on the masses of the parts, where the user lets the mass change.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,14 +25,14 @@ import numpy as np
 from frf_ipz.arguments import require_type
 from frf_ipz.arrays import BoolArray, FloatArray, require_shape
 from frf_ipz.display import Concise
-from frf_ipz.dofs import as_dofs
+from frf_ipz.dofs import Dof, as_dofs
 from frf_ipz.numerics.one_thread import on_one_thread
 from frf_ipz.numerics.pencils import undamped_poles
 from frf_ipz.structure import ReducedModel, StructuralModel
-from frf_ipz.updating.regions import Region, reduced_regions, smooth_regions
+from frf_ipz.updating.regions import Region, points_of_mass, reduced_regions, smooth_regions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from frf_ipz.dofs import AnyDof
 
@@ -114,6 +117,10 @@ class ParameterBasis(Concise):
         use them instead.
     attached : tuple of int
         Parameters that are masses of what is attached to the structure: none is less than nothing.
+    at_nodes : mapping of int to int
+        Parameters that are masses at nodes, as parts of the mass that moves, and which nodes.
+    moving_kg : float
+        That mass, kg; 0 without such parameters.
 
     Raises
     ------
@@ -150,6 +157,8 @@ class ParameterBasis(Concise):
     regions: tuple[Region, ...] = ()
     is_from_diagnosis: bool = False
     attached: tuple[int, ...] = ()
+    at_nodes: Mapping[int, int] = field(default_factory=dict)
+    moving_kg: float = 0.0
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -174,13 +183,13 @@ class ParameterBasis(Concise):
         """
         return np.where(self.logarithmic, np.expm1(np.where(self.logarithmic, theta, 0.0)), theta)
 
-    def without_attached(self, places: Sequence[int]) -> ParameterBasis:
-        """Leave out masses of what is attached: it weighs nothing.
+    def without(self, places: Sequence[int]) -> ParameterBasis:
+        """Leave out parameters, as masses that weigh nothing.
 
         Parameters
         ----------
         places : sequence of int
-            Which parameters, of `attached`.
+            Which parameters; none of those of `regions`.
 
         Returns
         -------
@@ -199,7 +208,14 @@ class ParameterBasis(Concise):
             logarithmic=self.logarithmic[stays],
             terms=tuple(replace(term, root=term.root[:, term.root.any(axis=0)]) for term in terms if term.root.any()),
             attached=tuple(int(numbers[place]) for place in self.attached if stays[place]),
+            at_nodes={int(numbers[place]): node for place, node in self.at_nodes.items() if stays[place]},
         )
+
+    @property
+    def is_of_nodes(self) -> BoolArray:
+        """Which terms are of masses at nodes alone, (t,)."""
+        is_node = np.isin(np.arange(len(self.names)), list(self.at_nodes))
+        return np.array([term.root[is_node].any() and not term.root[~is_node].any() for term in self.terms], bool)
 
     def slopes(self, theta: FloatArray) -> FloatArray:
         """Give the derivative of `amounts`.
@@ -321,6 +337,10 @@ def make_structural_basis(
         if mass:
             basis = join_bases(basis, _part_basis(regions, stiffness=False))
         basis = join_bases(basis, generic_basis(reduced_model, std=GENERIC_STD, common=False))
+        points = points_of_mass(fe_model, reduced_model)
+        weighed = {dof.node for dof in heavy_sensors if isinstance(dof, Dof)}  # what is there is that of the sensor
+        points = {node: rows for node, rows in points.items() if node not in weighed}
+        basis = join_bases(basis, _node_mass_basis(points, reduced_model))
     return join_bases(basis, _sensor_basis(reduced_model, heavy_sensors)) if heavy_sensors else basis
 
 
@@ -350,6 +370,8 @@ def join_bases(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:
         regions=first.regions,
         is_from_diagnosis=first.is_from_diagnosis or second.is_from_diagnosis,
         attached=(*first.attached, *(n_first + place for place in second.attached)),
+        at_nodes={**first.at_nodes, **{n_first + place: node for place, node in second.at_nodes.items()}},
+        moving_kg=first.moving_kg or second.moving_kg,
     )
 
 
@@ -396,6 +418,29 @@ def _sensor_basis(model: ReducedModel, sensors: Sequence[AnyDof]) -> ParameterBa
         logarithmic=np.zeros(len(dofs), bool),
         terms=(PriorTerm(name="mass of sensors", root=np.eye(len(dofs)), std=SENSOR_KG),),
         attached=tuple(range(len(dofs))),
+    )
+
+
+def _node_mass_basis(points: Mapping[int, FloatArray], model: ReducedModel) -> ParameterBasis:
+    """Mass at each node, as a part of the mass that moves: all together about as far off as masses are.
+
+    Squares of mass-normalised shapes add up to the number of modes over the mass that moves, where it is spread evenly:
+    at most nodes, but for those beside supports and on light parts.
+    """
+    mass = np.array([rows.T @ rows for rows in points.values()]).reshape(-1, len(model.mass), len(model.mass))
+    squares = np.einsum("nij,ij->n", mass, np.linalg.inv(model.mass))
+    moving = len(model.mass) / float(np.median(squares)) if len(squares) else 0.0
+    unchanged = np.zeros_like(mass)
+    term = PriorTerm(name="masses at nodes", root=np.eye(len(mass)), std=MASS_STD / max(len(mass), 1) ** 0.5)
+    return ParameterBasis(
+        names=tuple(f"mass at node {node}" for node in points),
+        mass=moving * mass,
+        damping=unchanged,
+        stiffness=unchanged,
+        logarithmic=np.zeros(len(mass), bool),
+        terms=(term,) if len(mass) else (),
+        at_nodes=dict(enumerate(points)),
+        moving_kg=moving,
     )
 
 

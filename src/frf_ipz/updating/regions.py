@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
-from frf_ipz.dofs import GENERALISED, Dof, node_dofs
+from frf_ipz.dofs import GENERALISED, TRANSLATIONS, Dof, node_dofs
 from frf_ipz.fe.assembly import multiply
 from frf_ipz.fe.stiffness_fields import stiffness_shares
 
@@ -140,6 +140,42 @@ def _fading_weights(coordinates: FloatArray, centres: FloatArray) -> FloatArray 
     squares = (np.linalg.norm(coordinates[:, None] - centres, axis=2) / spacing) ** 2
     weights = np.exp(-(squares - squares.min(axis=1, keepdims=True)) / 2)
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def points_of_mass(fe_model: StructuralModel, reduced_model: ReducedModel) -> dict[int, FloatArray]:
+    """Choose nodes at which a structure may have a mass that its model lacks.
+
+    Parameters
+    ----------
+    fe_model : StructuralModel
+        The FE model.
+    reduced_model : ReducedModel
+        Its reduced model.
+
+    Returns
+    -------
+    dict of int to (k, r) array
+        Of each node the motion along its axes for unit motions of the retained DOFs; all nodes that move, or one amid
+        each set of neighbours where there are more than `MAX_REGIONS`.
+    """
+    rows: dict[int, list[int]] = {}
+    moves = reduced_model.expansion.any(axis=1)
+    for row, dof in enumerate(reduced_model.expanded_dofs):
+        if moves[row] and isinstance(dof, Dof) and dof.direction in TRANSLATIONS:
+            rows.setdefault(dof.node, []).append(row)
+    place_of = {int(node): place for place, node in enumerate(fe_model.geometry.nodes)}
+    nodes = [node for node in rows if node in place_of]
+    if not nodes:
+        return {}
+    coordinates = fe_model.geometry.coordinates_m[[place_of[node] for node in nodes]]
+    chosen = [nodes[_amid(coordinates, members)] for members in _clusters(coordinates, MAX_REGIONS)]
+    return {node: reduced_model.expansion[rows[node]] for node in chosen}
+
+
+def _amid(coordinates: FloatArray, members: IntArray) -> int:
+    """Give the one of some points that is nearest to their centre."""
+    chosen = coordinates[members]
+    return int(members[np.argmin(np.linalg.norm(chosen - chosen.mean(axis=0), axis=1))])
 
 
 def motion_of_all_dofs(fe_model: StructuralModel, reduced_model: ReducedModel) -> tuple[FloatArray, BoolArray]:

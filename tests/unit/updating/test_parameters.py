@@ -74,14 +74,32 @@ def test_the_same_logarithm_everywhere_is_a_factor_on_the_stiffness(fe_model):
     assert np.abs(changed - 0.2 * model.stiffness).max() < EXACT * np.abs(model.stiffness).max()
 
 
-def test_masses_change_only_on_request(fe_model):
+def test_masses_of_parts_change_only_on_request(fe_model):
     model = reduced(fe_model)
-    assert not make_structural_basis(fe_model, model).mass.any()
+    without = make_structural_basis(fe_model, model)
+    assert set(np.flatnonzero(without.mass.any(axis=(1, 2)))) == set(without.at_nodes)
     basis = make_structural_basis(fe_model, model, mass=True)
     of_mass = np.array([name.startswith("mass of") for name in basis.names])
     assert of_mass.sum() == 20
     assert not basis.stiffness[of_mass].any()
     assert np.abs(basis.mass[of_mass].sum(0) - model.mass).max() < EXACT * np.abs(model.mass).max()
+
+
+def test_every_node_that_moves_may_have_a_mass(fe_model):
+    model = reduced(fe_model)
+    basis = make_structural_basis(fe_model, model)
+    assert sorted(basis.at_nodes.values()) == list(range(2, 22))
+    place = next(place for place, node in basis.at_nodes.items() if node == 7)
+    row = model.row(Dof(7, "z"))
+    assert_allclose(basis.mass[place], basis.moving_kg * np.outer(row, row), rtol=1e-12)
+    one = np.array([dof.direction == "z" for dof in fe_model.all_dofs], float)
+    assert_allclose(basis.moving_kg, one @ fe_model.mass_all @ one, rtol=0.5)
+
+
+def test_what_is_at_a_heavy_sensor_is_the_sensors(fe_model):
+    basis = make_structural_basis(fe_model, reduced(fe_model), sensors=(Dof(21, "z"),))
+    assert 21 not in basis.at_nodes.values()
+    assert 20 in basis.at_nodes.values()
 
 
 def test_the_mass_of_a_sensor_may_be_a_parameter(fe_model):

@@ -36,6 +36,7 @@ def mass_at_the_tip(*, modelled_kg, real_kg):
     fit, model = frf_ipz.fit_modes(frfs), make_beam(modelled_kg)
     reduced = frf_ipz.reduce_model(fit, model)
     basis = make_structural_basis(model, reduced, sensors=SENSORS)
+    basis = basis.without(list(basis.at_nodes))  # what the model has too much may be beside the sensor
     updated = frf_ipz.update_model(
         fit, reduced, fe_model=model, basis=basis, options=frf_ipz.UpdateOptions(expand=False, ensemble=0)
     )
@@ -68,11 +69,11 @@ def test_a_mass_that_is_left_out_takes_its_prior_along():
     model = make_beam(0.0)
     basis = make_structural_basis(model, frf_ipz.reduce_model(frfs, model), sensors=SENSORS)
     first, second = basis.attached
-    one = basis.without_attached([first])
+    one = basis.without([first])
     assert one.names == (*basis.names[:first], basis.names[second])
     assert one.attached == (first,)
     assert one.terms[-1].name == "mass of sensors"
     assert one.terms[-1].root.shape == (len(one.names), 1)
-    none = basis.without_attached([first, second])
+    none = basis.without([first, second])
     assert [term.name for term in none.terms] == [term.name for term in basis.terms[:-1]]
     assert not none.attached

@@ -1,10 +1,10 @@
 """``minimal-change``: the smallest change of the model, in a stated metric, that explains poles and zeros of all FRFs.
 
 The metric is that of a prior over what may be wrong in a model (`updating.parameters`): the change is the most likely
-one. First the stiffness (and, when asked, the mass) brings the moduli of poles and zeros to their targets, then the
-damping their real parts. Targets are weighted by the inverse of their covariance, so that noisy ones are met only
-to within their noise; targets that all others contradict are excluded, and reported. Matrices stay symmetric and
-positive semi-definite, rigid-body modes stay. The ensemble is drawn from the posterior.
+one. First the stiffness and masses at nodes (and, when asked, all of the mass) bring the moduli of poles and zeros to
+their targets, then the damping their real parts. Targets are weighted by the inverse of their covariance, so that noisy
+ones are met only to within their noise; targets that all others contradict are excluded, and reported. Matrices stay
+symmetric and positive semi-definite, rigid-body modes stay. The ensemble is drawn from the posterior.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.low_rank import factorise
 from frf_ipz.updating.along_structure import part_table
+from frf_ipz.updating.local_masses import name_local_masses
 from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
 from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble, draw_whitened, parameters_of
-from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate
+from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate, log_evidence_of
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, frame_of, modal_frame, modal_parameters
 from frf_ipz.updating.minimal_change.outliers import EXCLUDED_STD, contradicted_targets, unmet_targets
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase, log_moduli
@@ -46,7 +47,8 @@ SMALLEST_NOISE = 1e-6  # relative standard deviation of a frequency: none is mea
 OF_DAMPING = 1.0  # change of the logarithm of a modulus by damping, from which damping makes a root
 UNKNOWN_STD = 1e15  # relative, of what is no target: however far its root runs, and with it what moves it
 STEPS_BACK = 16  # to the nominal model: so many that roots keep the greater part of their vectors over each
-LEAST_DRAWS = 200  # to judge masses of sensors by
+LEAST_DRAWS = 200  # to judge masses of sensors and at nodes by
+SEED = 0  # of those at nodes: the same choice from the same inputs
 CHANCE = 0.05  # that of sensors without a mass any one is held to weigh less than nothing, and left out
 SHIFTED = 0.1  # standard deviations of a modulus from which the stiffness is updated again for the change by damping
 
@@ -71,7 +73,7 @@ def update(problem: UpdateProblem, options: UpdateOptions, progress: Progress) -
     if not len(problem.values):
         return nothing_to_do(problem.model, "minimal-change")
     frame = frame_of(problem.model, problem.at_ports)
-    update_of = _solve_with_masses(problem, frame, options, progress)
+    update_of = _likelier(problem, frame, options, progress)
     pairs, again = None, problem.pair_again
     for _ in range(ROUNDS):
         if again is None:
@@ -112,8 +114,32 @@ class _Update:
         return replace(nominal, mass=mass, damping=damping, stiffness=stiffness)
 
     @cached_property
+    def local_masses(self) -> tuple[str, ...]:
+        drawn = draw_whitened(self.posterior, np.random.default_rng(SEED), LEAST_DRAWS)
+        return name_local_masses(self.posterior.stiffness.basis, parameters_of(self.posterior, drawn))
+
+    @cached_property
+    def log_evidence(self) -> float:
+        return log_evidence_of(self.posterior.stiffness, self.posterior.stiffness_result)
+
+    @cached_property
     def values(self) -> ComplexArray:
         return self.problem.nearest_roots(self.model, self.posterior.values(len(self.problem.values)))
+
+
+def _likelier(problem: UpdateProblem, frame: ModalFrame, options: UpdateOptions, progress: Progress) -> _Update:
+    """Let masses at nodes change where targets are likelier so, and tell of a node for sure.
+
+    With and without them, each is as likely before. Some at all nodes, none of them sure, stand for other changes than
+    the prior of the stiffness has, as of a single element: they are not taken for masses.
+    """
+    basis = problem.basis
+    if basis is None or not basis.at_nodes:
+        return _solve_with_masses(problem, frame, options, progress)
+    loaded = _solve_with_masses(problem, frame, options, progress)
+    without = replace(problem, basis=basis.without(list(basis.at_nodes)))
+    unloaded = _solve_with_masses(without, frame, options, progress)
+    return loaded if loaded.local_masses and loaded.log_evidence > unloaded.log_evidence else unloaded
 
 
 def _solve_with_masses(
@@ -134,7 +160,7 @@ def _solve_with_masses(
         below = attached[surely_below(parameters_of(update_of.posterior, drawn)[:, attached])]
         if not len(below):
             return replace(update_of, drawn=(drawn, rng))
-        problem = replace(problem, basis=basis.without_attached(below.tolist()))
+        problem = replace(problem, basis=basis.without(below.tolist()))
         del update_of  # before another one takes as much memory
 
 
@@ -303,6 +329,7 @@ def _updated(update_of: _Update, options: UpdateOptions) -> UpdatedModel:
         after=update_of.values,
         ensemble=ensemble,
         unmet=unmet_targets(posterior.stiffness_result, problem.names, update_of.excluded),
+        warnings=update_of.local_masses,
         parts=_parts(posterior.stiffness.basis, posterior.stiffness_result.theta, draws),
     )
 

@@ -17,6 +17,7 @@ from frf_ipz.updating.gaussian import (
     Linearised,
     distance_to_optimum,
     linearise,
+    log_evidence,
     most_likely_scales,
     step_by_discrepancy,
 )
@@ -206,12 +207,7 @@ def iterate(
         Parameters, roots and errors at the end.
     """
     scales_are_held = scales is not None
-    terms = (
-        *phase.terms,
-        PriorTerm(
-            name="what no parameter explains", root=np.zeros((0, 0)), std=1.0, scale_uncertainty=SLACK_UNCERTAINTY
-        ),
-    )
+    terms = _with_slack(phase.terms)
     scales = np.array([term.std for term in terms]) if scales is None else scales.copy()
     if likely is not None:
         scales[:-1] = likely
@@ -265,6 +261,29 @@ def iterate(
         rows=tuple(rows),
         converged=converged,
     )
+
+
+def log_evidence_of(phase: Phase, result: PhaseResult) -> float:
+    """Give the logarithm of the evidence of what explains the targets, to be compared with that of other parameters.
+
+    Parameters
+    ----------
+    phase : Phase
+        Stiffness or damping.
+    result : PhaseResult
+        Its result.
+
+    Returns
+    -------
+    float
+        About the last linear step.
+    """
+    return log_evidence(result.linear, _with_slack(phase.terms), result.scales)
+
+
+def _with_slack(terms: tuple[PriorTerm, ...]) -> tuple[PriorTerm, ...]:
+    name = "what no parameter explains"
+    return (*terms, PriorTerm(name=name, root=np.zeros((0, 0)), std=1.0, scale_uncertainty=SLACK_UNCERTAINTY))
 
 
 def _explained(linear: Linearised, scales: FloatArray, mean: FloatArray) -> FloatArray:

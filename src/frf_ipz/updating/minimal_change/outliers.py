@@ -27,6 +27,9 @@ INSENSITIVE = 1e-3  # relative change by the prior's standard deviations below w
 def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots, theta: FloatArray) -> tuple[IntArray, FloatArray]:
     """Find targets that all others contradict: mostly pairs that join two different modes.
 
+    They are judged by changes of the stiffness: where masses at many nodes may take part, which together move any root
+    by some per cent, next to nothing is a contradiction.
+
     Parameters
     ----------
     phase : StiffnessPhase
@@ -47,13 +50,15 @@ def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots, theta: Floa
     slopes = phase.slopes(theta, start)
     noise = phase.noise.plus((CURVATURE * error**2) ** 2)
     data = error + slopes @ theta
-    stds = scales = np.array([term.std for term in phase.terms])
+    stds = np.array([term.std for term in phase.terms])
+    judging = np.flatnonzero(~phase.basis.is_of_nodes)
+    terms, scales = tuple(phase.terms[place] for place in judging.tolist()), stds[judging]
     most, is_far = int(MAX_SHARE * len(error)), np.abs(data) >= MIN_ERROR
     outliers = np.zeros(0, int)
-    linear = linearise((term.by_whitened(slopes) for term in phase.terms), data, noise, scales=stds)
+    linear = linearise((term.by_whitened(slopes) for term in terms), data, noise, scales=scales)
     del slopes  # large
     while len(outliers) <= most:
-        scales = most_likely_scales(linear, phase.terms, scales)
+        scales = most_likely_scales(linear, terms, scales)
         further = contradicted(
             linear,
             scales,
@@ -63,7 +68,9 @@ def contradicted_targets(phase: StiffnessPhase, start: TrackedRoots, theta: Floa
             judged=is_far,
         )
         if not len(further):
-            return outliers, scales
+            likely = stds.copy()
+            likely[judging] = scales
+            return outliers, likely
         outliers = np.append(outliers, further)
         noise = noise.plus(np.where(np.isin(np.arange(len(error)), further), EXCLUDED_STD**2, 0.0))
         linear = with_more_noise(linear, noise, further)

@@ -1,0 +1,56 @@
+"""Masses at single nodes that an update finds: what the structure carries there and its model lacks, or has too much.
+
+Many nodes are asked at once, so that one counts only where as many nodes of nothing would hardly show one by chance.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import ndtri
+
+from frf_ipz.visible_text import counted
+
+if TYPE_CHECKING:
+    from frf_ipz.arrays import FloatArray
+    from frf_ipz.updating.parameters import ParameterBasis
+
+CHANCE = 0.05  # that of nodes without a mass any one is named
+BAND = (0.05, 0.95)
+
+
+def name_local_masses(basis: ParameterBasis, draws: FloatArray) -> tuple[str, ...]:
+    """Name the nodes whose masses are surely off, the largest first.
+
+    Parameters
+    ----------
+    basis : ParameterBasis
+        Parameters of the update.
+    draws : (m, p) array
+        Of the parameters, from the posterior.
+
+    Returns
+    -------
+    tuple of str
+        One sentence with all of them; none where no mass is surely off, or nothing was drawn.
+    """
+    places = np.array(list(basis.at_nodes), int)
+    if not len(places) or len(draws) < 2:
+        return ()
+    kilograms = draws[:, places] * basis.moving_kg
+    means, stds = kilograms.mean(axis=0), kilograms.std(axis=0)
+    is_sure = np.abs(means) > -ndtri(CHANCE / 2 / len(places)) * stds
+    named = [place for place in np.argsort(-np.abs(means)) if is_sure[place]]
+    if not named:
+        return ()
+    ends = np.quantile(kilograms, BAND, axis=0)
+    nodes = [basis.at_nodes[int(places[place])] for place in named]
+    found = [
+        f"{means[place]:+.2g} kg at node {node} (90 %: {ends[0, place]:+.2g} to {ends[1, place]:+.2g} kg)"
+        for place, node in zip(named, nodes, strict=True)
+    ]
+    return (
+        f"poles and zeros tell of {counted(len(found), 'mass', 'masses')} that the model lacks, or has too much of: "
+        f"{', '.join(found)}; they are in the updated model, and a neighbouring node looks nearly alike",
+    )
