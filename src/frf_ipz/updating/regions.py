@@ -159,7 +159,7 @@ def points_of_mass(fe_model: StructuralModel, reduced_model: ReducedModel) -> di
         each set of neighbours where there are more than `MAX_REGIONS`.
     """
     rows: dict[int, list[int]] = {}
-    moves = reduced_model.expansion.any(axis=1)
+    moves = np.asarray(reduced_model.expansion.any(axis=1))
     for row, dof in enumerate(reduced_model.expanded_dofs):
         if moves[row] and isinstance(dof, Dof) and dof.direction in TRANSLATIONS:
             rows.setdefault(dof.node, []).append(row)
