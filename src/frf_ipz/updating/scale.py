@@ -57,6 +57,7 @@ SEED = 0  # of the draws: the same bands from the same inputs
 DRAWS = 200  # without an ensemble
 DECIBEL = 20 / np.log(10.0)
 HALF_OF_MASS = 0.5  # of its logarithm: squares of amplitudes go with the inverse of a mass
+UNSEEN = 1e-8  # of the largest amplitude: what rounding leaves of a mode along another axis
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -472,7 +473,9 @@ def _amplitudes(
     inputs = np.array([model.row(label.input_dof) for label in labels])
     squares, shapes = modes_of_stack(model.mass, model.stiffness)
     frequency = np.sqrt(np.maximum(squares, 0.0))
-    gaps = np.abs(frequency - omega[:, None])
+    seen = np.abs((outputs @ shapes) * (inputs @ shapes)).max(axis=0)
+    # along another axis a mode may have the same frequency, and be in no FRF
+    gaps = np.abs(frequency - omega[:, None]) + np.where(seen > UNSEEN * seen.max(), 0.0, frequency.max())
     chosen = shapes[:, linear_sum_assignment(gaps)[1]]  # of equal frequencies each its own mode
     computed = (outputs @ chosen) * (inputs @ chosen)
     members = np.zeros((len(ensemble), *computed.T.shape))

@@ -8,7 +8,9 @@ from frf_ipz.dofs import Dof
 from frf_ipz.export.realization import SecondOrder, select_states
 from frf_ipz.export.state_space import make_state_space
 from frf_ipz.fe.reduction.reduce import reduce_to_dofs
+from frf_ipz.numerics.pencils import modes_of_stack
 from frf_ipz.pairing.pair import pair_roots
+from frf_ipz.updating.scale import _amplitudes
 from frf_ipz.updating.update import update_model
 from frf_testbench.updating.synthetic_fit import TrueModes, list_labels, simulate_fit
 
@@ -81,3 +83,14 @@ def coupled(*pairs, inputs=(1.0, 0.0, 0.0, 0.0), outputs=(1.0, 0.0, 0.0, 0.0)):
 )
 def test_modes_are_kept_that_are_driven_and_seen_together(system, kept):
     assert np.flatnonzero(select_states(system).elastic).tolist() == kept
+
+
+def test_amplitudes_are_those_of_modes_that_the_sensors_see():
+    """To rounding each frequency is that of a mode along x and of one along y, which is in no FRF."""
+    reduced = reduce_to_dofs(
+        rows_of_masses("xy"), sensors=SENSORS, actuators=STRUCK, points=[Dof(4, "x")], band_hz=BAND_HZ
+    )
+    omega = np.sqrt(modes_of_stack(reduced.mass, reduced.stiffness)[0][::2])
+    no_members = np.zeros((0, 3, *reduced.mass.shape))
+    amplitudes, _ = _amplitudes(tuple(list_labels(STRUCK, SENSORS)), reduced, omega, no_members)
+    assert np.abs(amplitudes).max(axis=1).min() > 1e-4
