@@ -12,7 +12,7 @@ from frf_ipz.frf import FrfLabel
 from frf_ipz.rational import ZeroSet
 from frf_ipz.visible_text import counted
 
-ONE_SIDED = 0.25  # of the half width: a band that reaches less far to one side is given by both sides
+ONE_SIDED = 0.5  # of the half width: a band that reaches less far to one side is given by both sides
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -83,6 +83,23 @@ def test_matlab_files(tmp_path, version):
     assert recognises(path)
 
 
+@pytest.mark.parametrize("shape", [(3,), (3, 1), (1, 3)])
+@pytest.mark.parametrize("name", ["fem.mat", "fem.npz"])
+def test_lumped_masses_are_a_vector(tmp_path, name, shape):
+    """The stiffness beside them was taken for the mass, without a word."""
+    save = io.savemat if name.endswith("mat") else lambda path, arrays: np.savez(path, **arrays)
+    save(tmp_path / name, {"K": STIFFNESS, "M": np.diag(MASS).reshape(shape)})
+    model = read_model(model_toml(tmp_path, name, name))
+    assert_allclose(solve_modes(model).natural_frequency_hz, EXPECTED, rtol=ROUNDING)
+    assert f"{name}: 'M' is a vector of 3 values: the diagonal of the mass" in model.notes
+
+
+def test_no_stiffness_is_a_mass_for_want_of_one(tmp_path):
+    io.savemat(tmp_path / "fem.mat", {"K": STIFFNESS, "X": np.ones((2, 3))})
+    with pytest.raises(FileFormatError, match=r"fem.mat.* holds the matrices K; \[matrices\] variables = \{ mass = "):
+        read_model(model_toml(tmp_path, "fem.mat", "fem.mat"))
+
+
 def test_a_file_may_name_its_rows(tmp_path):
     labels = np.array(["1:x", "2:x", "3:x"])
     places = [[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]]

@@ -24,6 +24,13 @@ def test_the_remaining_amplitude_of_a_mode(remainder, noise):
     assert decay.frequency_hz == pytest.approx(211.3, abs=1.0)
 
 
+def test_a_signal_in_coarse_steps_rests_at_0_without_a_word_of_numpy():
+    response = np.round(ringing(211.3, 1e-4) / 0.05) * 0.05
+    with np.errstate(all="raise", under="ignore"):
+        decay = measure_decay(response, STEP_S, 2)
+    assert decay.remaining_amplitude < 0.05
+
+
 def test_the_slowest_of_several_modes_counts():
     response = ringing(90.0, 5e-3, 10.0) + ringing(211.3, 0.02) + ringing(700.0, 1e-3)
     decay = measure_decay(response, STEP_S, 2)

@@ -218,7 +218,7 @@ def test_roots_of_an_ensemble_are_found_once_for_all_its_bands(monkeypatch):
 
 @pytest.mark.parametrize(
     ("low_db", "high_db", "expected"),
-    [(-0.5, 0.5, "+-0.5 dB"), (-0.03, 0.53, "-0.03 to +0.53 dB"), (-0.4, 0.05, "-0.4 to +0.05 dB")],
+    [(-0.5, 0.5, "+-0.5 dB"), (-0.03, 0.53, "-0.03 to +0.53 dB"), (-0.36, 0.07, "-0.36 to +0.07 dB")],
 )
 def test_a_band_on_one_side_is_given_by_both_sides(low_db, high_db, expected):
     values = np.exp(1j * np.linspace(0.0, 2.0, 50))[:, None]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,11 +46,15 @@ def read_named(arrays: Mapping[str, Any], request: MatrixRequest) -> StoredMatri
         If there is no such matrix.
     """
     matrices = {name: value for name, value in arrays.items() if _is_square(value)}
-    chosen = request.choose(matrices)
-    value = matrices[chosen]
+    diagonals = {name: np.ravel(value) for name, value in arrays.items() if _is_vector(value) and request.means(name)}
+    chosen = request.choose(matrices | diagonals)
+    value = matrices[chosen] if chosen in matrices else sparse.diags_array(diagonals[chosen]).tocsr()
     matrix = as_matrix(_sparse_of_parts(value, request.path) if isinstance(value, tuple) else value, request)
     by_name = {name.lower(): value for name, value in arrays.items()}
     stored = both_triangles(matrix, request.path)
+    if chosen not in matrices:
+        note = f"{request.path.name}: '{chosen}' is a vector of {matrix.shape[0]} values: the diagonal of the {request.what}"
+        stored = replace(stored, notes=(*stored.notes, note))
     labels = next((by_name[name] for name in ROWS if name in by_name), None)
     if labels is None:
         return stored
@@ -71,6 +76,13 @@ def _is_square(value: Any) -> bool:  # noqa: ANN401 - any variable of a file
     kind = getattr(getattr(value, "dtype", None), "kind", "")
     shape: Any = getattr(value, "shape", ())
     return kind in "iufcb" and len(shape) == 2 and shape[0] == shape[1] and shape[0] > 0
+
+
+def _is_vector(value: Any) -> bool:  # noqa: ANN401 - any variable of a file
+    """Tell lumped values, as of a mass: one a row."""
+    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    shape: Any = getattr(value, "shape", ())
+    return kind in "iufc" and not sparse.issparse(value) and np.prod(shape) == max(shape, default=0) > 1
 
 
 def _sparse_of_parts(parts: tuple[str, tuple[int, ...], Mapping[str, Any]], path: Path) -> Matrix:

@@ -58,7 +58,7 @@ class MatrixRequest:
         Parameters
         ----------
         known : mapping
-            Square matrices by their names.
+            Square matrices, and vectors of the name, by their names.
 
         Returns
         -------
@@ -82,12 +82,32 @@ class MatrixRequest:
         named = [by_name[name] for name in NAMES[self.what] if name in by_name]
         if named:
             return named[0]
-        if len(known) == 1:
+        if len(known) == 1 and not self._is_another(*known):
             return next(iter(known))
         raise FileFormatError(
             self.path, f"holds the matrices {_listed(known)}; {key} says which is the {self.what}"
             if known else "holds no square matrix; export mass and stiffness"
         )  # fmt: skip
+
+
+    def means(self, name: str) -> bool:
+        """Tell whether a variable is called what is asked for.
+
+        Parameters
+        ----------
+        name : str
+            Of the variable.
+
+        Returns
+        -------
+        bool
+            By the name that the user says, or else a usual one.
+        """
+        return name.lower() in ({self.variable.lower()} if self.variable else NAMES[self.what])
+
+    def _is_another(self, name: str) -> bool:
+        """Tell whether a variable has a usual name of another matrix: no stiffness is a mass for want of one."""
+        return any(name.lower() in names for what, names in NAMES.items() if what != self.what)
 
 
 def _listed(known: Mapping[str, Any]) -> str:

@@ -166,9 +166,10 @@ def _has_decayed(first: FloatArray, last: FloatArray, first_floor: FloatArray, l
     Something of the mean power F under a peak of power P changes it by sqrt(2 F / P), relative: noise, and the flanks
     of other modes. Hum of any frequency, and a noise that goes on, stay as they are.
     """
-    tiny = np.finfo(float).tiny
-    variance = 2.0 * (first_floor / np.maximum(first, tiny) + last_floor / np.maximum(last, tiny))
-    drop = np.log(np.maximum(first, tiny) / np.maximum(last, tiny))
+    least = np.finfo(float).eps ** 2 * max(first.max(), last.max()) + np.finfo(float).tiny  # what rounding makes of 0
+    first, last = np.maximum(first, least), np.maximum(last, least)
+    variance = 2.0 * (first_floor / first + last_floor / last)
+    drop = np.log(first / last)
     return np.asarray((drop > 0.0) & (drop**2 > CERTAIN**2 * variance))
 
 
