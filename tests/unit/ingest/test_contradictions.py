@@ -171,6 +171,15 @@ def test_a_channel_that_is_bad_in_all_impacts_has_no_frf(tmp_path, change, reaso
     )
 
 
+def test_a_test_in_which_no_response_moves_is_refused(tmp_path):
+    def rest(signals):
+        signals[1:] = 0.0
+        return signals
+
+    with pytest.raises(frf_ipz.InputError, match=r"no response of hits/hit_1.csv moves \(acc_1 is dead: .* at 7:\+z"):
+        estimate(tmp_path, rest, bad=range(5))
+
+
 @pytest.mark.parametrize(("impacts", "bad"), [(5, (0, 2, 4)), (5, (1, 2, 3, 4)), (3, (0, 1)), (2, (0,))])
 def test_impacts_in_which_a_sensor_is_unplugged_are_no_majority(tmp_path, impacts, bad):
     result = estimate(tmp_path, kill, impacts=impacts, bad=bad)

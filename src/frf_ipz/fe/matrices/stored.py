@@ -89,7 +89,6 @@ class MatrixRequest:
             if known else "holds no square matrix; export mass and stiffness"
         )  # fmt: skip
 
-
     def means(self, name: str) -> bool:
         """Tell whether a variable is called what is asked for.
 

@@ -18,7 +18,7 @@ from frf_ipz.ingest.signals.faults import (
 from frf_ipz.ingest.signals.periods import find_period
 from frf_ipz.ingest.signals.pulses import find_pulse, force_band, pulse_extent
 from frf_ipz.ingest.signals.spikes import find_spikes, in_one_response
-from frf_ipz.ingest.survey.record_info import RecordInfo
+from frf_ipz.ingest.survey.record_info import STANDS_STILL, RecordInfo
 from frf_ipz.ingest.units import si_unit
 from frf_ipz.quantities import RESPONSES
 
@@ -217,7 +217,7 @@ def find_record_faults(test: VibrationTest, step_s: float, signals: FloatArray) 
     for channel, force in zip(test.input_channels, signals[:n_inputs], strict=True):
         once = force[-find_period(np.abs(force)) :]
         if not np.ptp(force):
-            faults.append(f"{channel.column} is dead: all its samples are {force[0]:.4g}")
+            faults.append(f"{channel.column} {STANDS_STILL} {force[0]:.4g}")
         elif is_clipped(once):
             faults.append(f"clipping of {channel.column}")
     once = slice(-find_period(np.abs(signals[0])), None)
@@ -256,7 +256,7 @@ def _find_bad_channels(
     faults: list[tuple[int, str]] = []
     for output, (channel, response) in enumerate(zip(test.output_channels, responses, strict=True)):
         if not np.ptp(response):
-            faults.append((output, f"{channel.column} is dead: all its samples are {response[0]:.4g}"))
+            faults.append((output, f"{channel.column} {STANDS_STILL} {response[0]:.4g}"))
             continue
         if is_clipped(response):
             faults.append((output, f"overload of {channel.column}"))

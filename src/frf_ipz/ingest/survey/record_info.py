@@ -11,6 +11,8 @@ from frf_ipz.arrays import FloatArray
 from frf_ipz.ingest.campaign import TestSetup
 from frf_ipz.ingest.signals.spikes import Spike
 
+STANDS_STILL = "is dead: all its samples are"  # and a value: what is wrong with a channel
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordInfo:

@@ -11,6 +11,7 @@ import numpy as np
 
 from frf_ipz.errors import InputError, did_you_mean
 from frf_ipz.ingest.signals.clipping import find_saturated_peaks
+from frf_ipz.ingest.survey.record_info import STANDS_STILL
 from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
@@ -267,6 +268,13 @@ def _least_bad(
             "again with a pre-trigger, which begins some milliseconds before the impact"
         )
     usable_records = [record for record in usable_records if not record.lacks_most]
+    still = [[text for _, text in record.channel_faults if STANDS_STILL in text] for record in usable_records]
+    if all(len(texts) >= len(setup.output_dofs) for texts in still):
+        raise InputError(
+            f"no response of {usable_records[0].name} moves ({'; '.join(still[0][:MOST_NAMES])}), nor of any other record "
+            f"at {setup.input_dof}: nothing was measured there; look at sensors, cables and columns, or take its entry "
+            "out of test.toml"
+        )
     late_records = [record for record in usable_records if any(record.missing_force) and len(record.faults) == 1]
     if late_records:  # how wrong they are is known
         return [record for record in late_records if record.used_outputs] or late_records
