@@ -53,7 +53,8 @@ def read_named(arrays: Mapping[str, Any], request: MatrixRequest) -> StoredMatri
     by_name = {name.lower(): value for name, value in arrays.items()}
     stored = both_triangles(matrix, request.path)
     if chosen not in matrices:
-        note = f"{request.path.name}: '{chosen}' is a vector of {matrix.shape[0]} values: the diagonal of the {request.what}"
+        vector = f"'{chosen}' is a vector of {matrix.shape[0]} values"
+        note = f"{request.path.name}: {vector}: the diagonal of the {request.what}"
         stored = replace(stored, notes=(*stored.notes, note))
     labels = next((by_name[name] for name in ROWS if name in by_name), None)
     if labels is None:

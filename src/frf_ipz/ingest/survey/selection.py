@@ -270,10 +270,10 @@ def _least_bad(
     usable_records = [record for record in usable_records if not record.lacks_most]
     still = [[text for _, text in record.channel_faults if STANDS_STILL in text] for record in usable_records]
     if all(len(texts) >= len(setup.output_dofs) for texts in still):
+        problem = f"no response of {usable_records[0].name} moves ({'; '.join(still[0][:MOST_NAMES])})"
         raise InputError(
-            f"no response of {usable_records[0].name} moves ({'; '.join(still[0][:MOST_NAMES])}), nor of any other record "
-            f"at {setup.input_dof}: nothing was measured there; look at sensors, cables and columns, or take its entry "
-            "out of test.toml"
+            f"{problem}, nor of any other record at {setup.input_dof}: nothing was measured there; look at "
+            "sensors, cables and columns, or take its entry out of test.toml"
         )
     late_records = [record for record in usable_records if any(record.missing_force) and len(record.faults) == 1]
     if late_records:  # how wrong they are is known
