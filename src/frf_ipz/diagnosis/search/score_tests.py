@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 BATCH_SIZE = 600  # signatures that are scored together
 LOCATIONS_AT_ONCE = 16  # whose many shapes are scored together: keeps arrays within some ten MB
 NEGLIGIBLE_FUNCTION = 1e-10  # of the largest: what shapes along the contour have of it is rounding
-SMALL_STEP = 1e-5  # of a neutral value, or of a range: so near, everything is linear
+SMALL_STEP = 1e-6  # of a neutral value, or of a range, to both sides: so near, even the sharpest peak is linear
 MAX_SCALING = 3.0  # times the size that a signature stands for, where its sizes are fixed
 VANISHING_RATIO = 1.5  # times: the FRFs change by more at the doubled parameter, if an effect vanishes with it
 
@@ -269,8 +269,8 @@ def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> Scor
     """
     response = base.hypothesis.respond(base.values, base.nuisance, data.measured.s)
     jacobian = nuisance_jacobian(response, problem.nuisance_prior, problem.context.layout)
-    whitened_nuisance, slopes = problem.nuisance_prior.whiten(base.nuisance)
-    columns = data.slopes(response, jacobian) / slopes
+    whitened_nuisance, _ = problem.nuisance_prior.whiten(base.nuisance)
+    columns = data.slopes(response, jacobian) / _secants(base.nuisance, whitened_nuisance)
     return ScoreTest(
         problem=problem,
         base=base,
@@ -281,6 +281,15 @@ def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> Scor
         whitened_nuisance=whitened_nuisance,
         response=response,
     )
+
+
+def _secants(nuisance: FloatArray, whitened_nuisance: FloatArray) -> FloatArray:
+    """Give the slopes of a parabola for the prior of each parameter: through zero and what the base has.
+
+    What one more component explains goes back to zero, from wherever beyond its tolerance it was: the slope there,
+    where the prior rises steeply, would say that a small part of the way is enough.
+    """
+    return np.divide(whitened_nuisance, nuisance, out=np.ones_like(nuisance), where=nuisance != 0)
 
 
 def run_score_test(problem: InferenceProblem, base: Fit) -> list[Start]:
@@ -402,7 +411,7 @@ def _score_directly(test: ScoreTest, component: Component) -> Start:
     is_between = first.low < first.neutral < first.high
     changed = test.change(hypothesis, np.array([values, *further_values]))
     if is_between:
-        changed = changed - test.change(hypothesis, np.array([neutral, *further_values]))
+        changed = 0.5 * (changed - test.change(hypothesis, np.array([2 * neutral - values, *further_values])))
     elif not _vanishes_with_parameter(
         changed, test.change(hypothesis, np.array([_double_effect(first, values), *further_values]))
     ):

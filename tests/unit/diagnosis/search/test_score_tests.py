@@ -7,11 +7,15 @@ import pytest
 
 from diagnosed import beam, labels, measured, problem_of
 from frf_ipz.diagnosis.evidence.inference_problem import make_data
+from frf_ipz.diagnosis.model.change import with_change
+from frf_ipz.diagnosis.model.nuisance import EDGE
 from frf_ipz.diagnosis.search.component_search import fit_null_model
-from frf_ipz.diagnosis.search.score_tests import prepare_score_test
+from frf_ipz.diagnosis.search.score_tests import prepare_score_test, run_score_test
 
 EXACT = 1e-8  # relative: sums of products of some thousand values
 N_SHAPES, N_SHARED = 7, 3
+LIGHT = 1e-3  # damping ratio: half the width of a peak
+PREDICTED = 0.1  # relative: a linear step of what shifts a peak by some widths
 
 
 @pytest.fixture(scope="module")
@@ -46,3 +50,21 @@ def test_shapes_are_scored_together_as_they_are_one_by_one(base, free_gains, is_
     one_by_one = test.score_changes(np.stack([across * shape[:, None] for shape in shapes], 2))
     for values, expected in zip(together, one_by_one, strict=True):
         np.testing.assert_allclose(values, expected, rtol=EXACT, atol=0)
+
+
+@pytest.mark.parametrize("force_N", [-12, 12])
+def test_what_a_step_promises_is_gained_though_the_nuisance_hides_it_beyond_its_tolerances(tmp_path, force_N):
+    """Peaks are so sharp that a force shifts them by several widths, and frequencies make up for it."""
+    model = beam(tmp_path, right="clamped", damping=LIGHT)
+    places = labels(("5:+z", "9:-z"))
+    nominal = problem_of(model, measured(model, places), ("axial_load",))
+    effect = nominal.effects["axial_load"]
+    change = effect.build(nominal.context, effect.locations(nominal.context)[0])(np.array([force_N]))
+    problem = problem_of(model, measured(with_change(model, change), places), ("axial_load",))
+    null = fit_null_model(problem)
+    assert null.is_nearly_right
+    assert np.abs(null.nuisance[problem.nuisance_prior.frequency_indices]).max() > EDGE
+    (start,) = run_score_test(problem, null)
+    fit = problem.fit((start.component,), start.values)
+    assert start.values == pytest.approx(fit.values, rel=PREDICTED)
+    assert start.cost == pytest.approx(fit.cost - null.cost, rel=PREDICTED)
