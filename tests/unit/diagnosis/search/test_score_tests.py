@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosed import beam, labels, measured, problem_of
+from diagnosed import beam, labels, lumped, measured, problem_of
+from frf_ipz.diagnosis.evidence.hypothesis import Component
 from frf_ipz.diagnosis.evidence.inference_problem import make_data
 from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.model.nuisance import EDGE
@@ -15,6 +16,8 @@ from frf_ipz.diagnosis.search.score_tests import prepare_score_test, run_score_t
 EXACT = 1e-8  # relative: sums of products of some thousand values
 N_SHAPES, N_SHARED = 7, 3
 LIGHT = 1e-3  # damping ratio: half the width of a peak
+JOINT, STIFFER = np.array([5e4, 0.01]), np.array([1.3])  # N/m and s, and a ratio
+ROUGHLY = 0.3  # relative: a linear step beside a first effect that moves far
 PREDICTED = 0.1  # relative: a linear step of what shifts a peak by some widths
 
 
@@ -68,3 +71,28 @@ def test_what_a_step_promises_is_gained_though_the_nuisance_hides_it_beyond_its_
     fit = problem.fit((start.component,), start.values)
     assert start.values == pytest.approx(fit.values, rel=PREDICTED)
     assert start.cost == pytest.approx(fit.cost - null.cost, rel=PREDICTED)
+
+
+def test_a_second_effect_is_promised_that_the_first_one_stands_for_too(tmp_path):
+    """A stiffer joint is nearly a stiffer spring: what it changes is seen once the first one's values may move."""
+    model = lumped(tmp_path)
+    names = labels(("1:+x", "3:+x"), ("2:+x",))
+    nominal = problem_of(model, measured(model, names), ("viscoelastic_joint", "local_stiffness"))
+    across = {
+        name: next(place for place in effect.locations(nominal.context) if place.springs == ("k2",))
+        for name, effect in nominal.effects.items()
+    }
+    joint, spring = (
+        Component(effect=nominal.effects[name], location=across[name], n_locations=3)
+        for name in ("viscoelastic_joint", "local_stiffness")
+    )
+    changes = [
+        component.effect.build(nominal.context, component.location)(values)
+        for component, values in ((joint, JOINT), (spring, STIFFER))
+    ]
+    true = with_change(model, changes[0] + changes[1])
+    problem = problem_of(model, measured(true, names), tuple(nominal.effects))
+    base = problem.fit((joint,), JOINT)
+    both = problem.fit((joint, spring), np.concatenate([JOINT, STIFFER]))
+    promised = next(start for start in run_score_test(problem, base) if start.component.key == spring.key)
+    assert promised.cost == pytest.approx(both.cost - base.cost, rel=ROUGHLY)
