@@ -67,9 +67,18 @@ stiffness_N_m = 2e5
 """
 
 
-def beam(folder: Path, *, elements=16, formulation="euler-bernoulli", thickness_m=0.005, left="clamped", right="free"):
+def beam(
+    folder: Path,
+    *,
+    elements=16,
+    formulation="euler-bernoulli",
+    thickness_m=0.005,
+    left="clamped",
+    right="free",
+    damping=0.01,
+):
     text = BEAM.format(elements=elements, formulation=formulation, thickness_m=thickness_m, left=left, right=right)
-    return _read(folder, text)
+    return _read(folder, text.replace("modal_ratio = 0.01", f"modal_ratio = {damping}"))
 
 
 def lumped(folder: Path, *, damping: str = "modal_ratio = 0.01", dashpot_Ns_m: float = 0.0):

@@ -43,6 +43,7 @@ from frf_ipz.diagnosis.verdict.decision import (
     log_bayes_factor,
 )
 from frf_ipz.diagnosis.verdict.findings import describe_component, make_finding, probability_of_need, rank_effects
+from frf_ipz.diagnosis.verdict.goodness import required_log_bayes_factor
 from frf_ipz.diagnosis.verdict.identifiability import find_best_sensor, find_detectable_sizes
 from frf_ipz.diagnosis.verdict.law_and_linear import search_beside_law, search_beside_linear
 from frf_ipz.diagnosis.verdict.mismatch import describe_mismatch, localise_mismatch
@@ -388,7 +389,7 @@ def _find_detectable_sizes(
     """Find how small an effect of each kind would show; None where there is no time for it."""
     limited = replace(problem, deadline=deadline)
     try:
-        return find_detectable_sizes(limited, decision.null, decision.null_goodness.required_log_bayes_factor)
+        return find_detectable_sizes(limited, decision.null, required_log_bayes_factor(limited, decision.null_goodness))
     except DeadlineError:
         return None
 

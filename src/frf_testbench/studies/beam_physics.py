@@ -30,7 +30,7 @@ from frf_ipz.diagnosis.measured.data_split import split_data
 from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.search.component_search import fit_null_model, search_component
 from frf_ipz.diagnosis.verdict.findings import describe_component
-from frf_ipz.diagnosis.verdict.goodness import FIRST_LOG_BAYES_FACTOR, assess_goodness
+from frf_ipz.diagnosis.verdict.goodness import assess_goodness, required_log_bayes_factor
 from frf_ipz.progress import silent
 from frf_testbench.studies.left_out import BeamTest, predict_left_out, read_beam
 
@@ -145,7 +145,8 @@ def add_causes(problem: InferenceProblem, progress: Progress) -> list[Fit]:
     for number in range(MOST_CAUSES):
         progress(0.5 * number / MOST_CAUSES, f"searching for cause {number + 1}")
         best = search_component(problem, fits[-1]).best
-        if best.log_evidence - fits[-1].log_evidence < FIRST_LOG_BAYES_FACTOR:
+        required = required_log_bayes_factor(problem, assess_goodness(problem, fits[-1]))
+        if best.log_evidence - fits[-1].log_evidence < required:
             break
         fits.append(best)
         if assess_goodness(problem, best).is_good:

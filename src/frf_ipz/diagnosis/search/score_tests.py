@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
+from frf_ipz.diagnosis.model.nuisance import UNIFORM_STD
 from frf_ipz.diagnosis.model.response import nuisance_jacobian
 from frf_ipz.diagnosis.search.global_scan import (
     MOTIONS_AT_ONCE,
@@ -38,7 +39,8 @@ if TYPE_CHECKING:
 BATCH_SIZE = 600  # signatures that are scored together
 LOCATIONS_AT_ONCE = 16  # whose many shapes are scored together: keeps arrays within some ten MB
 NEGLIGIBLE_FUNCTION = 1e-10  # of the largest: what shapes along the contour have of it is rounding
-SMALL_STEP = 1e-5  # of a neutral value, or of a range: so near, everything is linear
+SMALL_STEP = 1e-6  # of a neutral value, or of a range, to both sides: so near, even the sharpest peak is linear
+PARAMETER_STEP = 1e-6  # as searched, to both sides
 MAX_SCALING = 3.0  # times the size that a signature stands for, where its sizes are fixed
 VANISHING_RATIO = 1.5  # times: the FRFs change by more at the doubled parameter, if an effect vanishes with it
 
@@ -269,8 +271,8 @@ def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> Scor
     """
     response = base.hypothesis.respond(base.values, base.nuisance, data.measured.s)
     jacobian = nuisance_jacobian(response, problem.nuisance_prior, problem.context.layout)
-    whitened_nuisance, slopes = problem.nuisance_prior.whiten(base.nuisance)
-    columns = data.slopes(response, jacobian) / slopes
+    whitened_nuisance, _ = problem.nuisance_prior.whiten(base.nuisance)
+    columns = data.slopes(response, jacobian) / _secants(base.nuisance, whitened_nuisance)
     return ScoreTest(
         problem=problem,
         base=base,
@@ -281,6 +283,58 @@ def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> Scor
         whitened_nuisance=whitened_nuisance,
         response=response,
     )
+
+
+def free_parameters(test: ScoreTest) -> ScoreTest:
+    """Let the base's own parameters move along with one more component, as the nuisance does.
+
+    Where one component stands for two, what the second one changes is nearly what a change of the first one's values
+    does. The base is best without it: to the misfit itself that is orthogonal, and nothing would be promised.
+
+    Parameters
+    ----------
+    test : ScoreTest
+        With the nuisance alone.
+
+    Returns
+    -------
+    ScoreTest
+        With uniform priors of the parameters within their bounds.
+    """
+    hypothesis, base = test.base.hypothesis, test.base
+    if not hypothesis.parameters:
+        return test
+    searched, changes = hypothesis.clip_to_searched(base.values), []
+    for index in range(len(searched)):
+        ends = np.clip(
+            searched[index] + np.array([-PARAMETER_STEP, PARAMETER_STEP]), hypothesis.low[index], hypothesis.high[index]
+        )
+        below, above = (
+            hypothesis.respond(
+                hypothesis.to_physical(np.concatenate([searched[:index], [end], searched[index + 1 :]])),
+                base.nuisance,
+                test.data.measured.s,
+            ).values
+            for end in ends
+        )
+        changes.append((above - below) / (ends[1] - ends[0]))
+    deviations = (hypothesis.high - hypothesis.low) * UNIFORM_STD / 2
+    columns = np.hstack([test.columns, test.data.slopes(test.response, np.dstack(changes)) * deviations])
+    return replace(
+        test,
+        columns=columns,
+        factor=cholesky_with_prior(columns.T),
+        whitened_nuisance=np.concatenate([test.whitened_nuisance, np.zeros(len(searched))]),
+    )
+
+
+def _secants(nuisance: FloatArray, whitened_nuisance: FloatArray) -> FloatArray:
+    """Give the slopes of a parabola for the prior of each parameter: through zero and what the base has.
+
+    What one more component explains goes back to zero, from wherever beyond its tolerance it was: the slope there,
+    where the prior rises steeply, would say that a small part of the way is enough.
+    """
+    return np.divide(whitened_nuisance, nuisance, out=np.ones_like(nuisance), where=nuisance != 0)
 
 
 def run_score_test(problem: InferenceProblem, base: Fit) -> list[Start]:
@@ -298,7 +352,7 @@ def run_score_test(problem: InferenceProblem, base: Fit) -> list[Start]:
     list of Start
         The best values of each component, the most promising first; the cost is minus the gain in log-likelihood.
     """
-    test = prepare_score_test(problem, base, problem.sparse_data)
+    test = free_parameters(prepare_score_test(problem, base, problem.sparse_data))
     context = replace(problem.context, contour=problem.sparse_data.measured.s)
     components = [component for effect in problem.effects.values() for component in list_components(effect, context)]
 
@@ -402,7 +456,7 @@ def _score_directly(test: ScoreTest, component: Component) -> Start:
     is_between = first.low < first.neutral < first.high
     changed = test.change(hypothesis, np.array([values, *further_values]))
     if is_between:
-        changed = changed - test.change(hypothesis, np.array([neutral, *further_values]))
+        changed = 0.5 * (changed - test.change(hypothesis, np.array([2 * neutral - values, *further_values])))
     elif not _vanishes_with_parameter(
         changed, test.change(hypothesis, np.array([_double_effect(first, values), *further_values]))
     ):

@@ -15,13 +15,9 @@ from frf_ipz.diagnosis.search.component_search import Ranking, fit_null_model, s
 from frf_ipz.diagnosis.search.pair_search import search_pair
 from frf_ipz.diagnosis.verdict.findings import is_significant
 from frf_ipz.diagnosis.verdict.goodness import (
-    FIRST_LOG_BAYES_FACTOR,
-    LIMITS,
-    PARTIAL_LOG_BAYES_FACTOR,
-    STRONG_LOG_BAYES_FACTOR,
     Goodness,
     assess_goodness,
-    required_beside,
+    required_log_bayes_factor,
 )
 
 if TYPE_CHECKING:
@@ -31,6 +27,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
     from frf_ipz.progress import Progress
 
+NEAR_LOG_BAYES_FACTOR = 50.0  # behind a pair: one component that is so near needs no second start
+STRONG_LOG_BAYES_FACTOR = 200.0  # of a second component: with less, a third one is not searched for
 PAIR_SCORE = 0.75  # of a component that explains: above, pairs are tried too; 3 of 89 single ones had more
 # What was not looked at, where the time was over before that step was done
 WHOLE = "any effect"
@@ -104,16 +102,16 @@ def _decide_in_steps(problem: InferenceProblem, nothing: Decision, progress: Pro
     progress(0.3, "searching for one effect")
     null, null_goodness = nothing.null, nothing.null_goodness
     ranking = search_component(problem, null)
-    required = _required_log_bayes_factor(problem, null_goodness, ranking.best)
-    first = _judge_first(problem, nothing, ranking, required)
+    first = _judge_first(problem, nothing, ranking)
     yield replace(first, not_searched=SECOND if ranking.is_complete else FIRST)
     if not ranking.is_complete:
         raise DeadlineError
+    required = required_log_bayes_factor(problem, null_goodness, first.goodness)
     if not null_goodness.is_good or log_bayes_factor(ranking.best, null) >= required:
         ranking = rescore_ambiguity_set(problem, ranking)
     if ranking.best.explains_nearly_all and not assess_goodness(problem, ranking.best).is_good:
         ranking = rescore_ambiguity_set(problem, fit_distant_locations(problem, ranking))
-    first = _judge_first(problem, nothing, ranking, required)
+    first = _judge_first(problem, nothing, ranking)
     yield replace(first, not_searched=SECOND)
     if first.verdict == DiagnosisVerdict.CONSISTENT:
         return
@@ -145,11 +143,12 @@ def _decide_in_steps(problem: InferenceProblem, nothing: Decision, progress: Pro
         yield third
 
 
-def _judge_first(problem: InferenceProblem, nothing: Decision, ranking: Ranking, required: float) -> Decision:
+def _judge_first(problem: InferenceProblem, nothing: Decision, ranking: Ranking) -> Decision:
     """Judge the best single component; the nominal model, where that explains as much."""
     null, best, goodness = nothing.null, ranking.best, assess_goodness(problem, ranking.best)
     first = replace(nothing, verdict=DiagnosisVerdict.EXPLAINED, final=best, ranking=ranking, goodness=goodness)
     gain = log_bayes_factor(best, null)
+    required = required_log_bayes_factor(problem, nothing.null_goodness, goodness)
     if nothing.null_goodness.is_good and (gain < required or not is_significant(best, -1)):
         return replace(first, verdict=DiagnosisVerdict.CONSISTENT, final=null, goodness=nothing.goodness)
     if goodness.is_good:
@@ -157,19 +156,12 @@ def _judge_first(problem: InferenceProblem, nothing: Decision, ranking: Ranking,
     return replace(first, verdict=DiagnosisVerdict.UNEXPLAINED, final=best if gain > required else null)
 
 
-def _required_log_bayes_factor(problem: InferenceProblem, null_goodness: Goodness, best: Fit) -> float:
-    """Log Bayes factor that a first component needs; less where it explains the worst subband of the nominal model."""
-    underestimation = assess_goodness(problem, best).error_underestimation
-    return null_goodness.required_log_bayes_factor * min(1.0, underestimation / null_goodness.error_underestimation)
-
-
 def _accept_first(problem: InferenceProblem, first: Decision) -> Decision:
     """Accept a component that leaves nothing to explain, if it explains anything, and what explains much beside it."""
-    # the nominal model does not explain: what is likelier does
-    required = min(FIRST_LOG_BAYES_FACTOR, LIMITS[problem.kind].second_log_bayes_factor)
+    required = required_log_bayes_factor(problem, first.null_goodness, first.goodness)
     if not first.null_goodness.is_good and log_bayes_factor(first.final, first.null) < required:
         return replace(first, verdict=DiagnosisVerdict.UNEXPLAINED, final=first.null, goodness=first.null_goodness)
-    second = search_small_component(problem, first.final, required_beside(problem))
+    second = search_small_component(problem, first.final, required_log_bayes_factor(problem, first.goodness))
     pair_decision = _accept_further(problem, first, second)
     if pair_decision is not None:  # the largest evidence stays what it is: what is refused need not be rescored
         pair_decision = _accept_further(problem, first, rescore_ambiguity_set(problem, second))
@@ -187,10 +179,12 @@ def _search_pair(problem: InferenceProblem, ranking: Ranking) -> Ranking:
 
 def _drop_needless(problem: InferenceProblem, first: Decision, pair_fit: Fit) -> Decision | None:
     """Drop a component beside which the other one explains as much: it only helped to find it."""
+    pair_goodness = assess_goodness(problem, pair_fit)
     for number in range(2):
         single = fit_without_component(problem, pair_fit, number)
         goodness = assess_goodness(problem, single)
-        if goodness.is_good and log_bayes_factor(pair_fit, single) <= required_beside(problem):
+        required = required_log_bayes_factor(problem, goodness, pair_goodness)
+        if goodness.is_good and log_bayes_factor(pair_fit, single) <= required:
             fits = tuple(sorted((single, *first.ranking.fits), key=lambda fit: -fit.log_evidence))
             return replace(first, final=single, ranking=replace(first.ranking, fits=fits), goodness=goodness)
     return None
@@ -200,11 +194,9 @@ def _accept_further(problem: InferenceProblem, decision: Decision, ranking: Rank
     """Accept a further component, if it explains much."""
     if not ranking.fits:
         return None
-    goodness, limits = assess_goodness(problem, ranking.best), LIMITS[problem.kind]
+    goodness = assess_goodness(problem, ranking.best)
     gain = ranking.best_evidence - max(decision.final.log_evidence, decision.null.log_evidence)
-    required = limits.second_log_bayes_factor if goodness.is_good else PARTIAL_LOG_BAYES_FACTOR
-    if decision.goodness.is_good:
-        required = decision.goodness.error_underestimation * required_beside(problem)
+    required = required_log_bayes_factor(problem, decision.goodness, goodness)
     if gain <= required or goodness.score >= max(decision.goodness.score, 1.0):
         return None
     verdict = DiagnosisVerdict.EXPLAINED if goodness.is_good else DiagnosisVerdict.UNEXPLAINED
@@ -295,7 +287,7 @@ def fit_without_component(problem: InferenceProblem, fit: Fit, number: int) -> F
     from_there = fit_map(
         problem.make_hypothesis(components), problem.data, values, nuisance=fit.nuisance, iterations=12
     )
-    if log_bayes_factor(fit, from_there) <= PARTIAL_LOG_BAYES_FACTOR:
+    if log_bayes_factor(fit, from_there) <= NEAR_LOG_BAYES_FACTOR:
         return from_there
     anew = problem.fit(components, values)
     return max(from_there, anew, key=lambda candidate: candidate.log_evidence)

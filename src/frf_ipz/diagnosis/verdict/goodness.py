@@ -19,11 +19,8 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
     from frf_ipz.diagnosis.model.layout import Layout
 
-ODDS = 20.0  # to one: what is likelier than that is held to be so
+ODDS = 20.0  # to one: what is likelier than that is held to be so, and so much likelier is that nothing is missing
 LOG_ODDS = float(np.log(ODDS))
-FIRST_LOG_BAYES_FACTOR = 30.0  # of a finding over the nominal model
-PARTIAL_LOG_BAYES_FACTOR = 50.0  # of a second finding over the first one alone, where the two do not explain all
-STRONG_LOG_BAYES_FACTOR = 200.0  # of a second finding: with less, a third one is not searched for
 NUISANCE_CHI2_FLOOR = 45.0  # where the data determine few nuisance parameters
 NUISANCE_CHI2_DEVIATIONS = 4.0  # standard deviations of that sum by which it may exceed what the data determine
 MAX_SINGLE_DEVIATION = 3.2  # standard deviations of a damping ratio or gain: 172 tests with nothing missing reached 2.6
@@ -39,13 +36,6 @@ class Limits:
         Sum of squares over the number of values.
     subband : float
         The same of an FRF over a subband.
-    first_log_bayes_factor : float
-        Of a first finding over the nominal model.
-    second_log_bayes_factor : float
-        Of a second finding over the first one alone, where the two leave nothing to explain.
-    beside_log_bayes_factor : float or None
-        The same where the first one leaves nothing to explain either; None where noise is known so well that odds and
-        the number of hypotheses say it.
     frequency_deviation : float
         Standard deviations of one natural frequency: 153 tests with nothing missing reached 1.0; FRFs of two states,
         whose tolerances are learnt from one of them, 2.8.
@@ -53,45 +43,25 @@ class Limits:
 
     misfit: float
     subband: float
-    first_log_bayes_factor: float = FIRST_LOG_BAYES_FACTOR
-    second_log_bayes_factor: float = PARTIAL_LOG_BAYES_FACTOR
-    beside_log_bayes_factor: float | None = 80.0
     frequency_deviation: float = 2.5
 
+    @property
+    def decisive_log_bayes_factor(self) -> float:
+        """Log Bayes factor by which one component decides against another: odds, if errors are known to `subband`."""
+        return self.subband * LOG_ODDS
 
-# By what was measured: the coarser its noise is known, the wider. Each triple is misfit, subband and log Bayes factor.
-# With nothing missing, 50 tests with a hammer reached 0.8, 1.8 and 19, and a nuisance chi2 of 43 (seeds 30101 to 30120,
-# 40001 to 40047), one of 63 later ones 3.04 in a subband (from 152000000); 41 with a shaker from rest 1.1, 1.7 and 4,
-# and 60 more with their true components 1.2 and 3.6 (from 81000000 and 91000000), one of 8 later ones 4.5 in a subband
-# (from 152000000); 11 with shakers that run already, six of them with their true components, 0.7, 1.5 and 3 (from
-# 121000000, 131000000 and 141000000). Beside one true component a second one gained no more than 1 in 40 tests with a
-# hammer. Where one leaves something to explain that a second one explains, the odds are enough.
+
+# By what was measured: the coarser its noise is known, the wider. Misfit and subband: with nothing missing,
+# 50 tests with a hammer reached 0.8 and 1.8, and a nuisance chi2 of 43 (seeds 30101 to 30120, 40001 to 40047), one of
+# 63 later ones 3.04 in a subband (from 152000000); 41 with a shaker from rest 1.1 and 1.7, and 60 more with their true
+# components 1.2 and 3.6 (from 81000000 and 91000000), one of 8 later ones 4.5 in a subband (from 152000000); 11 with
+# shakers that run already, six of them with their true components, 0.7 and 1.5 (from 121000000, 131000000, 141000000).
 LIMITS = {
-    "hammer": Limits(misfit=1.1, subband=3.6, second_log_bayes_factor=LOG_ODDS, beside_log_bayes_factor=None),
-    "random": Limits(misfit=1.3, subband=5.0, second_log_bayes_factor=LOG_ODDS, beside_log_bayes_factor=None),
-    "running": Limits(misfit=1.5, subband=5.0, first_log_bayes_factor=40.0),
-    "frf": Limits(misfit=2.2, subband=6.5, first_log_bayes_factor=80.0, frequency_deviation=MAX_SINGLE_DEVIATION),
+    "hammer": Limits(misfit=1.1, subband=3.6),
+    "random": Limits(misfit=1.3, subband=5.0),
+    "running": Limits(misfit=1.5, subband=5.0),
+    "frf": Limits(misfit=2.2, subband=6.5, frequency_deviation=MAX_SINGLE_DEVIATION),
 }
-
-
-def required_beside(problem: InferenceProblem) -> float:
-    """Give the log Bayes factor that a component needs beside one that leaves nothing to explain.
-
-    With ``N`` kinds of effects the prior of one of them is ``1 / N``, that of its location is in its evidence already:
-    ``ln N`` and the logarithm of the odds are what data have to make up for.
-
-    Parameters
-    ----------
-    problem : InferenceProblem
-        With the effects that are searched for.
-
-    Returns
-    -------
-    float
-        Calibrated instead where the noise is not known from repeated records.
-    """
-    calibrated = LIMITS[problem.kind].beside_log_bayes_factor
-    return LOG_ODDS + float(np.log(max(len(problem.effects), 1))) if calibrated is None else calibrated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,11 +130,6 @@ class Goodness:
         return max(1.0, self.worst_subband) if self.is_good else 1.0
 
     @property
-    def required_log_bayes_factor(self) -> float:
-        """Log Bayes factor that a first component needs where this is the nominal model."""
-        return self.error_underestimation * self.limits.first_log_bayes_factor
-
-    @property
     def _over_limits(self) -> tuple[float, float, float, float, float]:
         return (
             self.misfit / self.limits.misfit,
@@ -173,6 +138,48 @@ class Goodness:
             (self.largest_deviation / MAX_SINGLE_DEVIATION) ** 2,
             (self.frequency_deviation / self.limits.frequency_deviation) ** 2,
         )
+
+
+def required_log_bayes_factor(problem: InferenceProblem, base: Goodness, found: Goodness | None = None) -> float:
+    """Give the log Bayes factor that one more component needs.
+
+    Of ``N`` kinds each has the prior ``1 / N``; that of its location is in its evidence already. Where the base leaves
+    nothing to explain, it is likelier by stated odds that nothing is missing. What is found has to be likelier than all
+    else by the same odds.
+
+    A log-likelihood counts the misfit in standard deviations, which are known to a factor only: its squares over a
+    subband may be as many times the expected ones as is held to be nothing missing. So much larger a log Bayes factor
+    may be than it would be with the right errors, and so much more is needed.
+
+    Parameters
+    ----------
+    problem : InferenceProblem
+        With the effects that are searched for.
+    base : Goodness
+        Of the fit without the component.
+    found : Goodness, optional
+        Of the fit with it.
+
+    Returns
+    -------
+    float
+        More where the base leaves more than expected in a subband, and the component does not explain that.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> limits = Limits(misfit=1.1, subband=3.6)
+    >>> base = SimpleNamespace(is_good=True, error_underestimation=1.0, limits=limits)
+    >>> f"{required_log_bayes_factor(SimpleNamespace(effects=range(17)), base):.1f}"
+    '31.8'
+    """
+    log_odds = LOG_ODDS + float(np.log(max(len(problem.effects), 1)))
+    if base.is_good:
+        log_odds += LOG_ODDS
+    underestimation = base.error_underestimation
+    if found is not None:
+        underestimation = min(underestimation, found.error_underestimation)
+    return base.limits.subband * underestimation * log_odds
 
 
 def assess_goodness(problem: InferenceProblem, fit: Fit) -> Goodness:

@@ -18,7 +18,7 @@ from frf_ipz.diagnosis.result import DiagnosisVerdict
 from frf_ipz.diagnosis.search.component_search import fit_null_model, search_component
 from frf_ipz.diagnosis.verdict.decision import log_bayes_factor
 from frf_ipz.diagnosis.verdict.findings import is_significant, make_finding, rank_effects
-from frf_ipz.diagnosis.verdict.goodness import LIMITS
+from frf_ipz.diagnosis.verdict.goodness import assess_goodness, required_log_bayes_factor
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -78,7 +78,7 @@ def search_beside_linear(
     if best is null or not (is_most or alone.nuisance_chi2 >= MAX_NUISANCE_CHI2) or not is_significant(best, -1):
         return None
     if (
-        log_bayes_factor(best, null) < LIMITS[problem.kind].first_log_bayes_factor
+        log_bayes_factor(best, null) < required_log_bayes_factor(problem, assess_goodness(problem, null))
         or best.hypothesis.components[-1].effect.has_dynamics
     ):
         return None  # resonators and dampers follow the traces of laws
@@ -129,7 +129,7 @@ def search_beside_law(
     best = ranking.best
     if (
         best is null
-        or log_bayes_factor(best, null) < LIMITS[problem.kind].first_log_bayes_factor
+        or log_bayes_factor(best, null) < required_log_bayes_factor(problem, assess_goodness(problem, null))
         or not is_significant(best, -1)
     ):
         return None

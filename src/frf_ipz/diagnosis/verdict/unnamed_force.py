@@ -23,7 +23,7 @@ from frf_ipz.diagnosis.search.global_scan import scan_globally
 from frf_ipz.diagnosis.search.neighbourhood_search import search_neighbourhoods
 from frf_ipz.diagnosis.search.rivals import MAX_BEHIND_COMPLETE
 from frf_ipz.diagnosis.search.robust_refinement import refine_halfway, refine_starts
-from frf_ipz.diagnosis.verdict.goodness import required_beside
+from frf_ipz.diagnosis.verdict.goodness import LIMITS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -191,7 +191,8 @@ def find_unnamed_force(problem: InferenceProblem, decision: Decision) -> Fit | N
         return None
     cost_limit = problem.fit_roughly(components, decision.final.values).cost + MAX_BEHIND_COMPLETE
     fits = [fit for kind in kinds if (fit := _fit_best_location(problem, decision.null, kind, cost_limit)) is not None]
-    required_log_evidence = decision.final.log_evidence + (required_beside(problem) if len(components) == 1 else 0.0)
+    required = LIMITS[problem.kind].decisive_log_bayes_factor if len(components) == 1 else 0.0
+    required_log_evidence = decision.final.log_evidence + required
     return max(
         (fit for fit in fits if fit.log_evidence > required_log_evidence),
         key=lambda fit: fit.log_evidence,

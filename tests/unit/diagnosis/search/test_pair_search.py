@@ -31,7 +31,7 @@ from frf_ipz.diagnosis.search.pair_search import search_pair
 from frf_ipz.diagnosis.search.robust_refinement import Start
 from frf_ipz.diagnosis.search.score_tests import run_score_test
 from frf_ipz.diagnosis.verdict.decision import decide
-from frf_ipz.diagnosis.verdict.goodness import LIMITS, ODDS, assess_goodness
+from frf_ipz.diagnosis.verdict.goodness import LIMITS, ODDS, assess_goodness, required_log_bayes_factor
 from frf_ipz.diagnosis.verdict.out_of_catalogue import describe_implausibility
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.beam_models import with_formulation
@@ -47,6 +47,7 @@ WEAK_N_M = 45.0  # so little that the mass alone leaves nothing to explain
 ROUNDING = 1e-9  # of the largest entry
 ATTACHED = shipped_effects()["attached_resonator"]
 LITTLE_KG = 2e-4
+KNOWN_NOISE = 1.5  # times the expected squares of the misfit over a subband
 LATE_S = 2e-5
 SMALL_GAIN = 0.96  # tolerances of gains are half a per cent
 GUESSED = np.array([0.04, 0.004, 0.03, 0.002])  # of modes that the model gives 1 %
@@ -130,7 +131,7 @@ def test_a_small_effect_beside_one_that_explains_nearly_all_is_named(nominal, mo
     assert [component.effect.name for component in decide(problem, silent).final.hypothesis.components] == [
         "added_mass"
     ]
-    monkeypatch.setitem(LIMITS, "frf", replace(LIMITS["frf"], beside_log_bayes_factor=None))
+    monkeypatch.setitem(LIMITS, "frf", replace(LIMITS["frf"], subband=KNOWN_NOISE))
     decision = decide(problem, silent)
     assert [component.effect.name for component in decision.final.hypothesis.components] == [
         "added_mass",
@@ -147,7 +148,7 @@ def test_what_a_good_model_leaves_in_its_worst_subband_raises_the_required_evide
     problem = problem_of(nominal, measured(with_point_masses(nominal, {12: 1.5 * LITTLE_KG})), ("added_mass",))
     null = fit_null_model(problem)
     gain = search_component(problem, null).best.log_evidence - null.log_evidence
-    monkeypatch.setitem(LIMITS, "frf", replace(LIMITS["frf"], first_log_bayes_factor=part * gain))
+    monkeypatch.setitem(LIMITS, "frf", replace(LIMITS["frf"], subband=part * gain / np.log(ODDS**2)))
     assert 1 / 0.95 < assess_goodness(problem, null).worst_subband < 1 / 0.8
     assert decide(problem, silent).verdict == verdict
 
@@ -155,8 +156,8 @@ def test_what_a_good_model_leaves_in_its_worst_subband_raises_the_required_evide
 def test_the_detectable_size_has_the_required_evidence(nominal, monkeypatch):
     frfs = measured(nominal)
     problem = problem_of(nominal, frfs, ("added_mass",))
-    needed = assess_goodness(problem, fit_null_model(problem)).required_log_bayes_factor
-    assert needed > LIMITS["frf"].first_log_bayes_factor
+    needed = required_log_bayes_factor(problem, assess_goodness(problem, fit_null_model(problem)))
+    assert needed > LIMITS["frf"].subband * np.log(ODDS**2)
     monkeypatch.setattr(diagnosing, "find_detectable_sizes", lambda _bench, _null, nats: {"added_mass": {"nats": nats}})
     diagnosis = diagnose(observed(frfs), nominal, options=DiagnoseOptions(effects=("added_mass",)))
     assert diagnosis.detectability["added_mass"]["nats"] == pytest.approx(needed)

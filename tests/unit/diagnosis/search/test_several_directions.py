@@ -21,7 +21,7 @@ from frf_ipz.diagnosis.options import DiagnoseOptions
 from frf_ipz.diagnosis.search.component_search import fit_null_model
 from frf_ipz.diagnosis.search.global_scan import SCAN_ERROR, scan_globally
 from frf_ipz.diagnosis.search.robust_refinement import compute_robust_misfit
-from frf_ipz.diagnosis.search.score_tests import SMALL_STEP, prepare_score_test, run_score_test
+from frf_ipz.diagnosis.search.score_tests import prepare_score_test, run_score_test
 from frf_ipz.dofs import Dof
 from frf_ipz.fe.changes import with_point_masses
 from frf_ipz.frf import FrfLabel
@@ -29,6 +29,7 @@ from frf_ipz.quantities import FrfQuantity
 
 N_NODES, NODE = 5, 4
 SAME = 1e-6  # relative, of costs whose basis lacks a few static shapes
+LITTLE = 1e-5  # of the mass: so little acts linearly
 LINEAR = 1e-3  # relative: what a small mass changes beyond the linear
 NAMES = tuple(
     FrfLabel(Dof(node, axis), force, FrfQuantity.ACCELERANCE, f"{node}{axis}", f"f{number}")
@@ -105,6 +106,6 @@ def test_a_score_test_promises_what_a_small_mass_in_all_directions_gains(nominal
     assert best.component.location.node == NODE
     test = prepare_score_test(problem, base, problem.sparse_data)
     hypothesis = problem.make_hypothesis((hang(best.component),), exact=False)
-    size = SMALL_STEP * problem.context.mass_kg
+    size = LITTLE * problem.context.mass_kg
     sizes, gains = test.score_changes(test.change(hypothesis, np.array([size]))[:, :, None])
     assert_allclose([best.values[0], -best.cost], [size * sizes[0], gains[0]], rtol=LINEAR)

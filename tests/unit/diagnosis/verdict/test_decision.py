@@ -7,7 +7,7 @@ import pytest
 
 from frf_ipz.diagnosis.search.component_search import Ranking
 from frf_ipz.diagnosis.verdict import decision
-from frf_ipz.diagnosis.verdict.goodness import LIMITS
+from frf_ipz.diagnosis.verdict.goodness import LIMITS, required_log_bayes_factor
 
 ALONE = -577.0  # nats
 N_KINDS = 18
@@ -18,10 +18,9 @@ def a_fit(log_evidence, name="local_stiffness"):
     return SimpleNamespace(hypothesis=SimpleNamespace(components=(component,)), log_evidence=log_evidence)
 
 
-def goodness_of(score, underrated=1.0):
-    needed = underrated * LIMITS["hammer"].first_log_bayes_factor
+def goodness_of(score, underrated=1.0, kind="hammer"):
     return SimpleNamespace(
-        is_good=score <= 1, score=score, error_underestimation=underrated, required_log_bayes_factor=needed
+        is_good=score <= 1, score=score, error_underestimation=underrated, limits=LIMITS[kind], misfit=0.5
     )
 
 
@@ -42,19 +41,30 @@ def found(score):
     )
 
 
+@pytest.mark.parametrize("kind", LIMITS)
+def test_what_a_component_needs_is_computed_from_odds_and_kinds(kind):
+    """One of 18 kinds, twenty to one; where nothing is left, also twenty to one that there is no more."""
+    problem, times = problem_of_kind(kind), LIMITS[kind].subband
+    for base, odds in ((1.1, 20 * N_KINDS), (0.8, 20 * 20 * N_KINDS)):
+        needed = required_log_bayes_factor(problem, goodness_of(base, kind=kind), goodness_of(0.5, kind=kind))
+        assert needed == pytest.approx(times * np.log(odds))
+    assert LIMITS[kind].decisive_log_bayes_factor == pytest.approx(times * np.log(20))
+    partly = required_log_bayes_factor(problem, goodness_of(9.0, kind=kind), goodness_of(3.0, kind=kind))
+    assert partly == pytest.approx(times * np.log(20 * N_KINDS))
+
+
 @pytest.mark.parametrize(
     ("score", "gain", "n_locations", "verdict"),
     [
-        (1.1, 2.0, 1, None),
-        (1.1, 3.1, 1, "explained"),
-        (1.1, 2.0, 4, "explained"),
-        (0.8, 5.0, 1, None),
-        (0.8, 7.0, 1, "explained"),
+        (1.1, 21.0, 1, None),
+        (1.1, 21.5, 1, "explained"),
+        (1.1, 20.0, 4, "explained"),
+        (0.8, 29.7, 1, None),
+        (0.8, 33.0, 1, "explained"),
     ],
 )
-def test_a_second_component_needs_odds_of_twenty_to_one_at_any_location(monkeypatch, score, gain, n_locations, verdict):
-    """Where nothing is left to explain, it is one of all kinds of effects: of 18, ln(18 * 20) = 5.9 nats."""
-    assert np.exp(LIMITS["hammer"].second_log_bayes_factor) == pytest.approx(20, rel=0.01)
+def test_a_second_component_needs_stated_odds_at_any_location(monkeypatch, score, gain, n_locations, verdict):
+    """Errors may be 3.6 times as large over a subband: so many times ln(18 * 20), and ln 20 where nothing is left."""
     monkeypatch.setattr(decision, "assess_goodness", lambda *_: goodness_of(0.5))
     first = found(score)
     second = Ranking(base=first.final, fits=tuple(a_fit(ALONE + gain) for _ in range(n_locations)), n_tried=9)
@@ -65,26 +75,19 @@ def test_a_second_component_needs_odds_of_twenty_to_one_at_any_location(monkeypa
 @pytest.mark.parametrize(
     ("kind", "gain", "verdict"),
     [
-        ("hammer", 2.0, "unexplained"),
-        ("hammer", 3.1, "explained"),
-        ("frf", 29.0, "unexplained"),
+        ("hammer", 20.0, "unexplained"),
+        ("hammer", 22.0, "explained"),
+        ("frf", 37.0, "unexplained"),
         ("frf", 40.0, "explained"),
     ],
 )
 def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, kind, gain, verdict):
-    """The nominal model leaves a little too much, and an effect a little less: odds of twenty to one."""
+    """The nominal model leaves a little too much, and an effect a little less."""
     null, best = a_fit(ALONE, ""), a_fit(ALONE + gain, "attached_resonator")
     best.explains_nearly_all = True
     monkeypatch.setattr(decision, "fit_null_model", lambda _: null)
     monkeypatch.setattr(
-        decision,
-        "assess_goodness",
-        lambda _, fit: SimpleNamespace(
-            is_good=fit is best,
-            score=1.01 if fit is null else 0.7,
-            required_log_bayes_factor=30.0,
-            error_underestimation=1.0,
-        ),
+        decision, "assess_goodness", lambda _, fit: goodness_of(1.01 if fit is null else 0.7, kind=kind)
     )
     monkeypatch.setattr(decision, "search_component", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
     monkeypatch.setattr(decision, "rescore_ambiguity_set", lambda _, ranking: ranking)
@@ -99,7 +102,7 @@ def test_what_an_effect_leaves_in_a_subband_shows_whether_errors_are_underestima
     monkeypatch, underestimation, verdict
 ):
     """A resonance that the nominal model lacks is a subband of one FRF; errors of the data stay beside any effect."""
-    null, best = a_fit(ALONE, ""), a_fit(ALONE + 33.0, "attached_resonator")
+    null, best = a_fit(ALONE, ""), a_fit(ALONE + 36.0, "attached_resonator")
     best.explains_nearly_all = True
     monkeypatch.setattr(decision, "fit_null_model", lambda _: null)
     monkeypatch.setattr(
@@ -116,7 +119,7 @@ def test_what_an_effect_leaves_in_a_subband_shows_whether_errors_are_underestima
 def test_an_effect_that_needs_much_nuisance_gives_way_to_two(monkeypatch, score, n_components):
     """A joint may stand for a resonator and a damper, with a large nuisance chi2."""
     first = found(score)
-    pair = a_fit(ALONE + 28.0)
+    pair = a_fit(ALONE + 33.0)
     pair.hypothesis.components *= 2
     monkeypatch.setattr(decision, "assess_goodness", lambda *_: goodness_of(0.5))
     nothing, tied = (Ranking(base=first.final, fits=fits, n_tried=9) for fits in ((), (a_fit(ALONE - 1.0),)))

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from frf_ipz.diagnosis.verdict.goodness import Goodness, Limits, _find_common
+from frf_ipz.diagnosis.verdict.goodness import Goodness, Limits, _find_common, required_log_bayes_factor
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,9 @@ def test_beside_a_model_with_underestimated_errors_an_effect_must_explain_more(m
         nuisance_chi2_limit=45.0,
     )
     assert goodness.error_underestimation == times
-    assert goodness.required_log_bayes_factor == times * limits.first_log_bayes_factor
+    log_odds = np.log(20 * 20) if goodness.is_good else np.log(20)
+    needed = required_log_bayes_factor(SimpleNamespace(effects=("added_mass",)), goodness)
+    assert needed == pytest.approx(times * limits.subband * log_odds)
 
 
 def test_a_part_of_the_band_counts_where_a_channel_or_a_point_has_it_in_common():
