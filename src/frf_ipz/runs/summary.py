@@ -30,7 +30,6 @@ MOST_NOTES = 3  # likewise
 MOST_PREDICTIONS = 3  # likewise, those with the widest bands
 NOTE = "  note"
 SECTIONS = {  # of the page, in which a stage's notes stand
-    "ingest": "Records",
     "fit": "Poles and zeros",
     "diagnose": "Diagnosis",
     "pair": "Pairing",
@@ -73,7 +72,8 @@ def summarise(results: Results) -> str:
         if result is not None:
             lines += _lines_of(stage, write(result), notes, results)
     has_page = results.path is not None and "report" in results.stages and "report" not in results.stale
-    lines += [f"{title:<12}{text}" for title, text in note_lines(notes, has_page=has_page)]
+    sections = SECTIONS | {"ingest": _section_of_test(results)}
+    lines += [f"{title:<12}{text}" for title, text in note_lines(notes, has_page=has_page, sections=sections)]
     mended = results.manifest.get("notes", [])
     lines += [f"{'' if place else 'mended':<12}{note}" for place, note in enumerate(mended)]
     lines[1:] = map(written_out, lines[1:])
@@ -91,7 +91,15 @@ def _lines_of(stage: str, texts: list[tuple[str, str]], notes: dict[str, list[st
     return [f"{title:<12}{text}{stale}" for title, text in texts if title != NOTE]
 
 
-def note_lines(notes: Mapping[str, Sequence[str]], *, has_page: bool) -> list[tuple[str, str]]:
+def _section_of_test(results: Results) -> str:
+    if results.estimate is not None and len(results.estimate.records):
+        return "Records"
+    return "Test" if results.frfs is None else "FRFs"
+
+
+def note_lines(
+    notes: Mapping[str, Sequence[str]], *, has_page: bool, sections: Mapping[str, str]
+) -> list[tuple[str, str]]:
     """Choose the notes of the first screen: one of each stage before a second one, and where the others stand.
 
     Parameters
@@ -100,6 +108,8 @@ def note_lines(notes: Mapping[str, Sequence[str]], *, has_page: bool) -> list[tu
         Of each stage.
     has_page : bool
         There is a page that has them all.
+    sections : mapping of str to str
+        Where on it those of each stage stand.
 
     Returns
     -------
@@ -111,7 +121,7 @@ def note_lines(notes: Mapping[str, Sequence[str]], *, has_page: bool) -> list[tu
     shown, rest = ranked[:MOST_NOTES], [stage for _, stage in ranked[MOST_NOTES:]]
     lines = [(NOTE, notes[stage][place]) for place, stage in shown]
     if rest:
-        where = ", ".join(f"{rest.count(stage)} under {SECTIONS[stage]}" for stage in dict.fromkeys(rest))
+        where = ", ".join(f"{rest.count(stage)} under {sections[stage]}" for stage in dict.fromkeys(rest))
         lines.append(("", f"and {len(rest)} more notes {'on the page' if has_page else 'in the report'}: {where}"))
     return lines
 

@@ -38,6 +38,11 @@ def reverse_all(signals):
     return signals
 
 
+def in_g(signals):
+    signals[1] /= 9.80665
+    return signals
+
+
 def exchange(signals):
     return signals[[0, 2, 1]]
 
@@ -143,6 +148,7 @@ def test_lost_samples_are_found_where_four_impacts_hardly_tell_that_one_is_wrong
     [
         (reverse_one, "acc_1 contradicts the other impacts: its sign is the opposite"),
         (double, "acc_1 contradicts the other impacts: it is 2 times as large"),
+        (in_g, "acc_1 contradicts the other impacts: it is 0.102 times as large"),
         (kill, "acc_1 is dead: nothing in it follows the force"),
         (flatten, "acc_1 is dead: all its samples are 0.25"),
         (overload, "overload of acc_1"),

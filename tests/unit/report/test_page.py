@@ -96,6 +96,19 @@ def test_every_section_is_there_in_the_order_of_the_chain(page):
     assert len(SECTIONS) == len(anchors)
 
 
+def test_notes_on_frfs_that_were_estimated_elsewhere_stand_with_them(tmp_path):
+    """The command says that they do; without records they stood nowhere."""
+    folder = synthetic_folder()
+    estimate = folder.results["ingest"]
+    notes = tuple(f"note {number} on FRFs" for number in range(5))
+    folder.results["ingest"] = replace(estimate, records=estimate.records[:0], warnings=notes)
+    text = page_of(folder, tmp_path)
+    assert '<section id="recordings"' not in text
+    (section,) = re.findall(r'<section id="frfs".*?</section>', text, re.DOTALL)
+    assert all(note in section for note in notes)
+    assert re.search(r"and \d+ more notes .*: .*under FRFs", Results(folder).summary())
+
+
 def test_nothing_is_fetched_from_elsewhere(page):
     reader = read(page)
     assert reader.sources == []

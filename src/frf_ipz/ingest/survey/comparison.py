@@ -393,13 +393,15 @@ def _explain(
     force, response, noise = spectra.force[impact], spectra.responses[impact, output], spectra.noise[impact, output]
     misfit = comparison.misfit(force, response, noise)
     start, lost, share = lost_samples
-    if lost and (share <= DISAGREE**2 or comparison.explains(misfit, max(misfit * share, 1.0), 1)):
-        what = f"{abs(lost)} samples {'are lost' if lost > 0 else 'came in'}"
-        return f"{what} {start * survey.step_s:.4g} s after its beginning"
     expected = comparison.frf * force
     weight = 1.0 / np.maximum(np.maximum(comparison.scatter, noise), np.finfo(float).tiny)
     factor = complex(np.sum(weight * expected.conj() * response) / np.sum(weight * np.abs(expected) ** 2))
-    if abs(factor) and comparison.explains(misfit, comparison.misfit(force, response / factor, noise), 1):
+    scaled = comparison.misfit(force, response / factor, noise) if factor else misfit
+    is_lost = lost and (share <= DISAGREE**2 or comparison.explains(misfit, max(misfit * share, 1.0), 1))
+    if is_lost and not scaled < misfit * share:
+        what = f"{abs(lost)} samples {'are lost' if lost > 0 else 'came in'}"
+        return f"{what} {start * survey.step_s:.4g} s after its beginning"
+    if comparison.explains(misfit, scaled, 1):
         return f"it is {abs(factor):.3g} times as large"
     return ""
 

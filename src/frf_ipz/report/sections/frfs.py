@@ -47,11 +47,15 @@ def build(run: Results) -> Section | None:
         )
     lead = f"{text}, {number(step, 3)} Hz apart.{window}"
     table = _table(frfs, fitted_lines(run))
+    estimate = run.estimate
+    has_records = estimate is not None and len(estimate.records) > 0  # notes stand with them then
     return Section(
         anchor="frfs",
         title="FRFs",
         lead=lead,
         blocks=tuple(run_figures(run, "frfs", hints={"frf": ZOOM_HINT}, tables={"frf": table})),
+        notes=() if estimate is None or has_records else estimate.warnings,
+        choices=() if estimate is None or has_records else estimate.choices,
     )
 
 

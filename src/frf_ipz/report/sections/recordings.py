@@ -31,11 +31,16 @@ def build(run: Results) -> Section | None:
     Returns
     -------
     Section or None
-        None for FRFs that were estimated elsewhere.
+        None for FRFs that were estimated elsewhere, whose notes stand with them; notes alone for modes.
     """
     estimate = run.estimate
-    if estimate is None or not len(estimate.records):
+    if estimate is None:
         return None
+    if not len(estimate.records):
+        if run.frfs is not None or not estimate.warnings:
+            return None
+        lead = "Modes that were identified elsewhere."
+        return Section(anchor="recordings", title="Test", lead=lead, notes=estimate.warnings, choices=estimate.choices)
     records = estimate.records
     used = int(records["used"].astype(bool).sum())
     return Section(
