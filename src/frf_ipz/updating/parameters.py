@@ -283,7 +283,7 @@ def generic_basis(model: ReducedModel, *, std: float = GENERIC_STD_ALONE, common
 def make_structural_basis(
     fe_model: StructuralModel, reduced_model: ReducedModel, *, mass: bool = False, sensors: Sequence[AnyDof | str] = ()
 ) -> ParameterBasis:
-    """Factors on the parts of the FE model, masses of sensors, and generic changes that parts cannot express.
+    """Factors on the parts of the FE model, masses of sensors and at nodes, and generic changes that parts cannot express.
 
     Parameters
     ----------
@@ -320,7 +320,7 @@ def make_structural_basis(
     >>> reduced_model = frf_ipz.reduce_model(fit, beam, points=["9:+z"])
     >>> basis = frf_ipz.make_structural_basis(beam, reduced_model)
     >>> len(basis.names), basis.names[0]
-    (31, 'stiffness of element 1')
+    (41, 'stiffness of element 1')
     """
     require_type("fe_model", fe_model, StructuralModel)
     require_type("reduced_model", reduced_model, ReducedModel)
