@@ -283,7 +283,7 @@ def generic_basis(model: ReducedModel, *, std: float = GENERIC_STD_ALONE, common
 def make_structural_basis(
     fe_model: StructuralModel, reduced_model: ReducedModel, *, mass: bool = False, sensors: Sequence[AnyDof | str] = ()
 ) -> ParameterBasis:
-    """Factors on the parts of the FE model, masses of sensors and at nodes, and generic changes that parts cannot express.
+    """Factors on parts of the FE model, masses of sensors and at nodes, and generic changes that parts cannot express.
 
     Parameters
     ----------
