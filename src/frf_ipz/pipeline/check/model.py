@@ -31,16 +31,18 @@ def look_at_model(model: StructuralModel) -> Look:
     Returns
     -------
     Look
-        Lines.
+        Lines; that the modes cannot be computed is an open point, as a run ends there.
     """
+    frequencies, open_points = _describe_frequencies(model)
     return Look(
+        open_points=open_points,
         lines=(
             f"model       {model.name} ({model.kind}), {counted(len(model.dofs), 'free DOF')}",
             f"  mass      {_describe_mass(model)}",
             *([] if model.geometry.is_schematic else [f"  size      {_describe_size(model)}"]),
-            f"  modes     {_describe_frequencies(model)}",
+            f"  modes     {frequencies}",
             *(f"  note      {note}" for note in model.notes),
-        )
+        ),
     )
 
 
@@ -62,11 +64,12 @@ def _describe_size(model: StructuralModel) -> str:
     return ", ".join(along) or "a single point"
 
 
-def _describe_frequencies(model: StructuralModel) -> str:
+def _describe_frequencies(model: StructuralModel) -> tuple[str, tuple[str, ...]]:
+    """Give the first frequencies, and what stands in the way of them."""
     try:
         modes = solve_modes(model, n_modes=min(FREQUENCIES + RIGID_MOTIONS, model.n_modes))
     except NumericalError as error:
-        return f"cannot be computed: {error}"
+        return "cannot be computed, see below", (f"modes of the model cannot be computed: {error}",)
     elastic = modes.natural_frequency_hz[modes.natural_frequency_hz > 0]
     text = " ".join(number(hz) for hz in elastic[:FREQUENCIES]) + " Hz"
     unstable = -2 * np.pi * modes.natural_frequency_hz[modes.natural_frequency_hz < 0]
@@ -74,4 +77,4 @@ def _describe_frequencies(model: StructuralModel) -> str:
     if len(unstable):
         rates = ", ".join(f"+-{number(float(rate))}" for rate in np.sort(unstable))
         text += f", besides {counted(len(unstable), 'mode')} of negative stiffness with poles at {rates} rad/s"
-    return f"{text}, besides {counted(rigid, 'rigid-body motion')}" if rigid else text
+    return (f"{text}, besides {counted(rigid, 'rigid-body motion')}" if rigid else text), ()

@@ -51,8 +51,8 @@ def describe_setup(inputs: PipelineInputs) -> str:
     geometry = test.geometry if inputs.fe_model is None else inputs.fe_model.geometry
     if geometry is not None:
         lines += [*draw(geometry, test.output_dofs, test.input_dofs, inputs.points), ""]
-    if inputs.fe_model is not None:
-        lines += look_at_model(inputs.fe_model).lines
+    model = Look() if inputs.fe_model is None else look_at_model(inputs.fe_model)
+    lines += model.lines
     lines.append(f"test        {test.name} ({test.kind}), {counted(len(test.files), 'file')}")
     files = RecordingFiles(test=test)
     read_lines, is_whole = open_recordings(files)
@@ -69,7 +69,7 @@ def describe_setup(inputs: PipelineInputs) -> str:
         f"points   *  {_names(inputs.points)}",
         "",
     ]
-    open_points = [*comparison.open_points, *measurement.open_points, *_measured_points(inputs)]
+    open_points = [*model.open_points, *comparison.open_points, *measurement.open_points, *_measured_points(inputs)]
     marks = look_for_marks(_toml_files(inputs)).open_points
     lines += _conclusion(open_points, marks)
     return "\n".join(map(one_line, lines))
