@@ -20,7 +20,7 @@ CHANCE = 0.05  # that of nodes without a mass any one is named
 BAND = (0.05, 0.95)
 
 
-def name_local_masses(basis: ParameterBasis, draws: FloatArray) -> tuple[str, ...]:
+def name_local_masses(basis: ParameterBasis, draws: FloatArray, *, n_without_counterpart: int = 0) -> tuple[str, ...]:
     """Name the nodes whose masses are surely off, the largest first.
 
     Parameters
@@ -29,6 +29,8 @@ def name_local_masses(basis: ParameterBasis, draws: FloatArray) -> tuple[str, ..
         Parameters of the update.
     draws : (m, p) array
         Of the parameters, from the posterior.
+    n_without_counterpart : int
+        Measured poles that the model has none for: then masses may stand for what is missing.
 
     Returns
     -------
@@ -50,7 +52,11 @@ def name_local_masses(basis: ParameterBasis, draws: FloatArray) -> tuple[str, ..
         f"{means[place]:+.2g} kg at node {node} (90 %: {ends[0, place]:+.2g} to {ends[1, place]:+.2g} kg)"
         for place, node in zip(named, nodes, strict=True)
     ]
+    doubt = ""
+    if n_without_counterpart:
+        poles = f"{counted(n_without_counterpart, 'measured pole')} {'have' if n_without_counterpart > 1 else 'has'}"
+        doubt = f"; {poles} no counterpart, so that they may stand for something else that is missing"
     return (
         f"poles and zeros tell of {counted(len(found), 'mass', 'masses')} that the model lacks, or has too much of: "
-        f"{', '.join(found)}; they are in the updated model, and a neighbouring node looks nearly alike",
+        f"{', '.join(found)}; they are in the updated model, and a neighbouring node looks nearly alike{doubt}",
     )

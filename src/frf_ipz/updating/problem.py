@@ -62,6 +62,8 @@ class UpdateProblem:
         Parameters chosen by a diagnosis, or those of the FE model's parts; None for the method's own generic ones.
     pair_again : PairAgain, optional
         Pairs with a model that has been updated; None where the pairs are to stand.
+    n_without_counterpart : int
+        Measured poles that the model has none for.
     """
 
     model: ReducedModel
@@ -73,6 +75,7 @@ class UpdateProblem:
     names: tuple[str, ...]
     basis: ParameterBasis | None = None
     pair_again: PairAgain | None = None
+    n_without_counterpart: int = 0
 
     @property
     def frfs(self) -> tuple[int, ...]:
@@ -151,6 +154,7 @@ def make_problem(model: ReducedModel, fit: ModalFit, pairs: Pairs, basis: Parame
         frf=np.array([pair.frf for pair in targets], int),
         names=tuple(_name(pair.kind, pair.frf, pair.measured_value, fit) for pair in targets),
         basis=basis,
+        n_without_counterpart=pairs.count("pole").missing,
     )
 
 

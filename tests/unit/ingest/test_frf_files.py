@@ -344,6 +344,13 @@ def test_one_frf_twice(tmp_path):
     )
 
 
+def test_a_phase_without_a_magnitude_is_refused_as_such(tmp_path):
+    rows = [f"{hertz}\t{np.degrees(np.angle(value))}" for hertz, value in zip(LINES_HZ, VALUES[:, 0], strict=True)]
+    (tmp_path / "frf.txt").write_text("\n".join(["Frequency [Hz]\tPhase [deg]", *rows]), encoding="utf-8")
+    text = message(tmp_path, entry("frf.txt") + '\noutput_dof = "1:+z"\ninput_dof = "3:+z"')
+    assert "it has 'Phase [deg]' alone beside 'Frequency [Hz]': an FRF needs real and imaginary part" in text
+
+
 def test_files_without_common_lines(tmp_path):
     long_csv(tmp_path, outputs=("1:+z",))
     long_csv(tmp_path, name="b.csv", outputs=("2:+z",), lines_hz=LINES_HZ * 1.37)

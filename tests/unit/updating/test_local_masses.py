@@ -85,3 +85,5 @@ def test_one_of_many_masses_of_nothing_is_hardly_ever_named(beam):
     assert 0.01 < named < 0.12
     assert name_local_masses(basis, draws[0] + 9.0)
     assert not name_local_masses(basis, draws[0][:0])
+    (said,) = name_local_masses(basis, draws[0] + 9.0, n_without_counterpart=2)
+    assert "2 measured poles have no counterpart, so that they may stand for something else that is missing" in said

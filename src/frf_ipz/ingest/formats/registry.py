@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from frf_ipz.modes import ModalParameters
 
 FEWEST_COLUMNS = 3  # frequency and two parts of a value
+TWO_PARTS = "an FRF needs real and imaginary part, or magnitude and phase, in one file"
 LETTERS_SHOWN, NAMES_SHOWN = 40, 5  # of names of columns, in a message
 
 
@@ -99,6 +100,8 @@ def _columns_unknown(path: Path) -> str:
     except FileFormatError:
         return ""
     names = next((row for row in reversed(layout.header) if len(row) == layout.n_columns), ())
+    if names and layout.n_columns == FEWEST_COLUMNS - 1:
+        return f"; it has '{names[-1][:LETTERS_SHOWN]}' alone beside '{names[0][:LETTERS_SHOWN]}': {TWO_PARTS}"
     if not names or layout.n_columns < FEWEST_COLUMNS:
         return ""
     shown = ", ".join(f"'{name[:LETTERS_SHOWN]}'" for name in names[:NAMES_SHOWN])

@@ -116,7 +116,10 @@ class _Update:
     @cached_property
     def local_masses(self) -> tuple[str, ...]:
         drawn = draw_whitened(self.posterior, np.random.default_rng(SEED), LEAST_DRAWS)
-        return name_local_masses(self.posterior.stiffness.basis, parameters_of(self.posterior, drawn))
+        draws = parameters_of(self.posterior, drawn)
+        return name_local_masses(
+            self.posterior.stiffness.basis, draws, n_without_counterpart=self.problem.n_without_counterpart
+        )
 
     @cached_property
     def log_evidence(self) -> float:
