@@ -47,6 +47,19 @@ def test_a_burst_in_one_channel_is_named_and_costs_little(n_impacts):
     assert "output 2" not in marks[1]
 
 
+def test_steps_in_two_of_five_are_no_group_of_impacts():
+    """What is left of two steps that were taken off is alike; the other response was not touched."""
+    rng, impacts = np.random.default_rng(6), []
+    for number, height in enumerate(HEIGHTS):
+        signals = impact(STRUCTURE, height=height, noise=5 * NOISE, rng=rng)
+        if number in (1, 3):
+            signals[1, 2500:] += np.abs(signals[1]).max()
+        impacts.append(signals)
+    result = frf_ipz.estimate_frfs(in_memory(impacts))
+    assert any("jumps" in text for text in result.warnings)
+    assert not any("two groups" in text for text in result.warnings)
+
+
 def test_a_single_impact_with_a_burst_has_a_variance_that_holds_it():
     result = estimate(2, 1)
     over_std, _ = relative_errors(result.frfs)

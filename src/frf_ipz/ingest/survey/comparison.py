@@ -167,9 +167,13 @@ def _compare_setup(
         for impact in second:
             del causes[impact][output]
             unlike.remove((impact, output))
-    found = {
-        impacts: find_two_groups(spectra, [output for output, same in enumerate(agree) if same == impacts], impacts)
-        for impacts in dict.fromkeys(agree)
+    mended = {
+        spike.output for record in records for spike in record.spikes
+    }  # what is left of it is alike, and no group
+    found = dict.fromkeys(agree) | {
+        impacts: find_two_groups(spectra, outputs, impacts)
+        for impacts in agree
+        if (outputs := [output for output, same in enumerate(agree) if same == impacts and output not in mended])
     }
     groups = [found[impacts] for impacts in agree]
     doubts = tuple(1.0 if pair is None else pair.variance_factor for pair in groups)
