@@ -6,6 +6,7 @@ import pytest
 import frf_ipz
 from clamped_beam import BEAM
 from frf_ipz.updating.local_masses import name_local_masses
+from frf_ipz.updating.methods import minimal_change
 from frf_ipz.updating.parameters import make_structural_basis
 
 LINES = np.arange(5.0, 2000.0, 2.0)
@@ -72,6 +73,23 @@ def test_a_sound_model_names_no_mass(beam):
     assert not [text for text in updated.warnings if "that the model lacks" in text]
     assert np.abs(updated.model.mass - updated.nominal.mass).max() < 1e-2 * np.abs(updated.nominal.mass).max()
     assert np.median(10 * np.log10(prediction.magnitude_high / prediction.magnitude_low)) < 0.15
+
+
+@pytest.mark.parametrize(("mass_kg", "n_updates"), [(0.0, 1), (0.002, 2)])
+def test_an_update_with_masses_is_made_only_where_the_one_without_them_promises_one(
+    beam, monkeypatch, mass_kg, n_updates
+):
+    made = []
+    solve = minimal_change._solve_with_masses
+
+    def counted(problem, *further):
+        made.append(len(problem.basis.at_nodes))
+        return solve(problem, *further)
+
+    monkeypatch.setattr(minimal_change, "_solve_with_masses", counted)
+    masses = [frf_ipz.BeamPointMass(node=17, mass_kg=mass_kg)] if mass_kg else []
+    updated_to(beam, frf_ipz.make_beam(**{**BEAM, "youngs_modulus_Pa": 71e9}, point_mass=masses))
+    assert [bool(count) for count in made] == [False, True][:n_updates]
 
 
 def test_one_of_many_masses_of_nothing_is_hardly_ever_named(beam):

@@ -23,7 +23,7 @@ from frf_ipz.updating.along_structure import part_table
 from frf_ipz.updating.local_masses import name_local_masses
 from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
 from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble, draw_whitened, parameters_of
-from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate, log_evidence_of
+from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, gain_of_new_terms, iterate, log_evidence_of
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, frame_of, modal_frame, modal_parameters
 from frf_ipz.updating.minimal_change.outliers import EXCLUDED_STD, contradicted_targets, unmet_targets
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase, log_moduli
@@ -139,10 +139,26 @@ def _likelier(problem: UpdateProblem, frame: ModalFrame, options: UpdateOptions,
     basis = problem.basis
     if basis is None or not basis.at_nodes:
         return _solve_with_masses(problem, frame, options, progress)
-    loaded = _solve_with_masses(problem, frame, options, progress)
     without = replace(problem, basis=basis.without(list(basis.at_nodes)))
     unloaded = _solve_with_masses(without, frame, options, progress)
+    if not _promises_masses(problem, basis, frame, unloaded):
+        return unloaded
+    loaded = _solve_with_masses(problem, frame, options, progress)
     return loaded if loaded.local_masses and loaded.log_evidence > unloaded.log_evidence else unloaded
+
+
+def _promises_masses(problem: UpdateProblem, basis: ParameterBasis, frame: ModalFrame, unloaded: _Update) -> bool:
+    """Tell whether masses at nodes would make the targets likelier, to first order about an update without them.
+
+    All else stays as likely as it is. What data ask of masses shows in the cost of the change that took their place.
+    """
+    known, result = unloaded.posterior.stiffness, unloaded.posterior.stiffness_result
+    wanted = {*known.basis.names, *(basis.names[place] for place in basis.at_nodes)}
+    basis = basis.without([place for place, name in enumerate(basis.names) if name not in wanted])
+    phase = replace(_stiffness_phase(replace(problem, basis=basis), frame), targets=known.targets, noise=known.noise)
+    values = dict(zip(known.basis.names, result.theta.tolist(), strict=True))
+    theta = np.array([values.get(name, 0.0) for name in phase.basis.names])
+    return gain_of_new_terms(phase, result, theta, phase.basis.is_of_nodes) > 0.0
 
 
 def _solve_with_masses(
