@@ -51,6 +51,7 @@ CONTRACTING = 0.25  # of the gain of the step before: beyond it a curvature from
 ROWS_AT_ONCE = 4096
 DRAWS_OF_A_SCALE = 4  # of parameters, on average, for each draw of their terms' standard deviations
 ROWS_OF_A_TILE = 128  # when a matrix is mirrored: both tiles stay in the cache
+SIZES = (0.25, 0.5, 1.0, 2.0)  # of further parameters that are tried, over their standard deviation before the data
 ALIKE = 1e-4  # relative, of the noise of each datum: none is known as well
 LARGEST_SHARES = 1e3  # in a mixture: what rounding may grow by
 OF_PRIOR = 1e-2  # of its information: what rounding may take of it
@@ -870,6 +871,42 @@ def log_evidence(linear: Linearised, terms: Sequence[PriorTerm], scales: FloatAr
     free = np.array([term.scale_uncertainty > 0 for term in terms])
     logs = np.log(np.maximum(scales, np.finfo(float).tiny))[free]
     return -_ScaleSearch(linear, terms, free, scales).evidence(logs).value
+
+
+def gain_of_further_terms(linear: Linearised, further: FloatArray, scales: FloatArray, factor: float) -> float:
+    """Give by how much further parameters would make the data likelier, all else held.
+
+    With C the covariance of the data d, and F the sensitivity to the further parameters, the logarithm of the evidence
+    grows by ``b^T (1 + s^2 B)^-1 b s^2 / 2 - ln det(1 + s^2 B) / 2``, where ``B = F^T C^-1 F``, ``b = F^T C^-1 d``.
+
+    Parameters
+    ----------
+    linear : Linearised
+        The data, with the parameters that there are.
+    further : (n, m) array
+        Sensitivity of the data, as they were given, to the unit normal numbers of further ones.
+    scales : (t,) array
+        Standard deviations of the terms that there are.
+    factor : float
+        On the slack.
+
+    Returns
+    -------
+    float
+        At the likeliest of some sizes ``s`` of the further parameters.
+    """
+    further = linear.rotated(further)
+    weighted = further / (linear.level + factor**2)[:, None]
+    root, right = linear.information(scales, factor)
+    beside = linear.factors(scales)[:, None] * (linear.joined[:, : linear.ends[-1]].T @ weighted)
+    solved = cho_solve((root, False), np.column_stack([beside, right]), check_finite=False)
+    told = further.T @ weighted - beside.T @ solved[:, :-1]
+    asked = weighted.T @ linear.data - beside.T @ solved[:, -1]
+    values, axes = np.linalg.eigh((told + told.T) / 2.0)
+    values, asked = np.maximum(values, 0.0), axes.T @ asked
+    growth = [1.0 + size**2 * values for size in SIZES]
+    gains = [size**2 * asked @ (asked / by) - np.log(by).sum() for size, by in zip(SIZES, growth, strict=True)]
+    return float(max(gains)) / 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -94,6 +94,15 @@ def test_lumped_masses_are_a_vector(tmp_path, name, shape):
     assert f"{name}: 'M' is a vector of 3 values: the diagonal of the mass" in model.notes
 
 
+@pytest.mark.parametrize("as_sparse", [False, True])
+def test_complex_matrices_without_an_imaginary_part_are_real(tmp_path, as_sparse):
+    made = sparse.csc_array if as_sparse else np.array
+    io.savemat(tmp_path / "fem.mat", {"K": made(STIFFNESS + 0j), "M": made(MASS + 0j)})
+    np.savez(tmp_path / "fem.npz", K=STIFFNESS + 0j, M=MASS + 0j)
+    for name in ("fem.mat", "fem.npz"):
+        assert_allclose(frequencies(model_toml(tmp_path, name, name)), EXPECTED, rtol=ROUNDING)
+
+
 def test_no_stiffness_is_a_mass_for_want_of_one(tmp_path):
     io.savemat(tmp_path / "fem.mat", {"K": STIFFNESS, "X": np.ones((2, 3))})
     with pytest.raises(FileFormatError, match=r"fem.mat.* holds the matrices K; \[matrices\] variables = \{ mass = "):

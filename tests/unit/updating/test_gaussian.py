@@ -8,9 +8,11 @@ from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
 from frf_ipz.updating.gaussian import (
+    SIZES,
     contradicted,
     distance_to_optimum,
     draw_posterior,
+    gain_of_further_terms,
     linearise,
     most_likely_scales,
     solve_step,
@@ -79,6 +81,20 @@ def test_shared_errors_blocks_and_slack_are_those_of_the_whole_matrix(many):
     assert_allclose(linear.square(error, factor), step.misfit, rtol=1e-9)
     assert_allclose(step.n_determined, np.trace(np.eye(5) - covariance), rtol=1e-9)
     assert_allclose(np.concatenate([rows for _, rows in linear.sensitivity(np.ones(2))]), sensitivity, rtol=1e-9)
+
+
+def test_the_gain_of_further_parameters_is_that_of_the_whole_covariance(many):
+    sensitivity, data, noise = many
+    slack, factor, scales = np.linspace(0.1, 2.0, len(data)), 0.7, np.array([0.4, 1.3])
+    parts = [sensitivity[:, :2], sensitivity[:, 2:]]
+    further = np.random.default_rng(4).standard_normal((len(data), 3))
+    matrix = whole(noise) + np.diag((factor * slack) ** 2)
+    matrix += sum(scale**2 * part @ part.T for scale, part in zip(scales, parts, strict=True))
+    before = multivariate_normal(cov=matrix).logpdf(data)
+    gains = [multivariate_normal(cov=matrix + s**2 * further @ further.T).logpdf(data) - before for s in SIZES]
+    for combining in (False, True):
+        linear = linearise(parts, data, noise, slack, scales=scales, combining=combining)
+        assert_allclose(gain_of_further_terms(linear, further, scales, factor), max(gains), rtol=1e-7)
 
 
 def test_errors_are_drawn_with_the_cholesky_factor_of_the_whole_matrix(many):

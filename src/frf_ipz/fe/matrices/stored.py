@@ -207,7 +207,7 @@ def as_matrix(values: Any, request: MatrixRequest) -> Matrix:  # noqa: ANN401 - 
     Returns
     -------
     (n, n) sparse array
-        Real or complex.
+        Real, or complex where an imaginary part is not 0.
 
     Raises
     ------
@@ -218,7 +218,8 @@ def as_matrix(values: Any, request: MatrixRequest) -> Matrix:  # noqa: ANN401 - 
     if given.ndim != 2 or given.dtype.kind not in "iufc":
         raise FileFormatError(request.path, f"the {request.what} is no matrix of numbers; export it again")
     matrix: Any = sparse.csr_array(given)
-    matrix = matrix.astype(np.complex128 if matrix.dtype.kind == "c" else np.float64)
+    is_complex = matrix.dtype.kind == "c" and bool(np.any(matrix.data.imag))
+    matrix = matrix.astype(np.complex128) if is_complex else sparse.csr_array(matrix.real).astype(np.float64)
     rows, columns = matrix.shape
     if rows != columns:
         raise FileFormatError(request.path, f"is {rows} x {columns}; a square matrix is needed")

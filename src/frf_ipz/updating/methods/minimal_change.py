@@ -20,10 +20,11 @@ from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.low_rank import factorise
 from frf_ipz.updating.along_structure import part_table
+from frf_ipz.updating.gaussian import gain_of_further_terms
 from frf_ipz.updating.local_masses import name_local_masses
 from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
 from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble, draw_whitened, parameters_of
-from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, gain_of_new_terms, iterate, log_evidence_of
+from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate, log_evidence_of
 from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, frame_of, modal_frame, modal_parameters
 from frf_ipz.updating.minimal_change.outliers import EXCLUDED_STD, contradicted_targets, unmet_targets
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase, log_moduli
@@ -152,13 +153,13 @@ def _promises_masses(problem: UpdateProblem, basis: ParameterBasis, frame: Modal
 
     All else stays as likely as it is. What data ask of masses shows in the cost of the change that took their place.
     """
-    known, result = unloaded.posterior.stiffness, unloaded.posterior.stiffness_result
-    wanted = {*known.basis.names, *(basis.names[place] for place in basis.at_nodes)}
-    basis = basis.without([place for place, name in enumerate(basis.names) if name not in wanted])
-    phase = replace(_stiffness_phase(replace(problem, basis=basis), frame), targets=known.targets, noise=known.noise)
-    values = dict(zip(known.basis.names, result.theta.tolist(), strict=True))
-    theta = np.array([values.get(name, 0.0) for name in phase.basis.names])
-    return gain_of_new_terms(phase, result, theta, phase.basis.is_of_nodes) > 0.0
+    result = unloaded.posterior.stiffness_result
+    others = [place for place in range(len(basis.names)) if place not in basis.at_nodes]
+    of_nodes = _stiffness_phase(replace(problem, basis=replace(basis, regions=()).without(others)), frame)
+    slopes = of_nodes.slopes(np.zeros(len(of_nodes.basis.names)), result.tracked)
+    (term,) = of_nodes.terms
+    further = term.by_whitened(slopes) * term.std
+    return gain_of_further_terms(result.linear, further, result.scales[:-1], float(result.scales[-1])) > 0.0
 
 
 def _solve_with_masses(

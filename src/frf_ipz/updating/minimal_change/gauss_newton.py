@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from frf_ipz.arrays import BoolArray, FloatArray
+from frf_ipz.arrays import FloatArray
 from frf_ipz.updating.gaussian import (
     GaussianStep,
     Linearised,
@@ -32,7 +32,6 @@ MAX_HALVINGS = 6
 CURVATURE = 0.5  # of the squared error at first, then of the error of the last linear prediction: counts as noise
 SLACK_UNCERTAINTY = 1.5  # standard deviation of the logarithm of the factor on the slack
 STALLED = 3.0  # factor on that noise after a step that had to be rejected
-SIZES, NOTHING = (0.25, 0.5, 1.0, 2.0), 1e-6  # of new terms, over their standard deviation before the data are seen
 SCALE_ITERATIONS = 3  # iterations that maximise the evidence: later ones would only follow their own change
 
 
@@ -280,39 +279,6 @@ def log_evidence_of(phase: Phase, result: PhaseResult) -> float:
         About the last linear step.
     """
     return log_evidence(result.linear, _with_slack(phase.terms), result.scales)
-
-
-def gain_of_new_terms(phase: Phase, result: PhaseResult, theta: FloatArray, is_new: BoolArray) -> float:
-    """Give by how much further terms of the prior make the targets likelier, to first order about a result.
-
-    Parameters
-    ----------
-    phase : Phase
-        With the further terms.
-    result : PhaseResult
-        Without them.
-    theta : (p,) array
-        Its parameters, with zeros for what is new.
-    is_new : (t,) bool array
-        Which terms.
-
-    Returns
-    -------
-    float
-        Of the logarithms of the evidence, at the likeliest of some sizes of the new terms; all else is held.
-    """
-    slopes = phase.slopes(theta, result.tracked)
-    data = result.error + slopes @ theta
-    scales = np.array([term.std for term in phase.terms])
-    scales[~is_new] = result.scales[:-1]
-    parts = (term.by_whitened(slopes) for term in phase.terms)
-    linear = linearise(parts, data, phase.noise, phase.slack, scales=scales, combining=False)
-    held = [replace(term, scale_uncertainty=0.0) for term in _with_slack(phase.terms)]
-
-    def evidence(size: float) -> float:
-        return log_evidence(linear, held, np.append(np.where(is_new, size * scales, scales), result.scales[-1]))
-
-    return max(map(evidence, SIZES)) - evidence(NOTHING)
 
 
 def _with_slack(terms: tuple[PriorTerm, ...]) -> tuple[PriorTerm, ...]:
