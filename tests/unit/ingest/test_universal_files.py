@@ -143,6 +143,14 @@ def test_a_data_set_without_its_first_mark_is_refused(tmp_path, kind):
     assert f"line {data_set().count(chr(10)) + 1}: a data set {kind} begins without the line of -1" in text
 
 
+def test_a_line_with_a_number_too_many_is_refused(tmp_path):
+    """Its columns are those of the others, and what stands beyond them was not read."""
+    lines = data_set().splitlines()
+    lines[30] += "  1.23450e+00"
+    text = message(tmp_path, "\n".join([*lines, ""]))
+    assert "holds 593 numbers where its head promises 592" in text
+
+
 def test_a_file_that_is_cut_off_is_refused(tmp_path):
     text = data_set()
     for length in (len(text) // 2, 300, 20, len(text) - 40):

@@ -348,7 +348,9 @@ def _read_text(
     is_cut = not lines.remaining
     lines.skip_to_end_mark()
     fault: Exception | None = None
-    splits: tuple[Callable[[str], list[str]], ...] = (str.split, lambda row: _split_by_widths(row.rstrip(), widths))
+    splits: list[Callable[[str], list[str]]] = [str.split]
+    if all(len(row.rstrip()) <= sum(widths) for row in rows):  # else columns would lose what stands beyond them
+        splits.append(lambda row: _split_by_widths(row.rstrip(), widths))
     for split in splits:
         tokens = [split(row) for row in rows]
         n_tokens = sum(map(len, tokens))
