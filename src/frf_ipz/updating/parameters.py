@@ -197,14 +197,17 @@ class ParameterBasis(Concise):
             Without them.
         """
         stays = ~np.isin(np.arange(len(self.names)), places)
+        kept = np.flatnonzero(stays)
+        is_run = len(kept) > 0 and kept[-1] - kept[0] + 1 == len(kept)
+        rows = slice(kept[0], kept[-1] + 1) if is_run else kept  # of a run, matrices need no copy
         numbers = np.cumsum(stays) - 1
         terms = [replace(term, root=term.root[stays]) for term in self.terms]
         return replace(
             self,
             names=tuple(name for name, is_kept in zip(self.names, stays, strict=True) if is_kept),
-            mass=self.mass[stays],
-            damping=self.damping[stays],
-            stiffness=self.stiffness[stays],
+            mass=self.mass[rows],
+            damping=self.damping[rows],
+            stiffness=self.stiffness[rows],
             logarithmic=self.logarithmic[stays],
             terms=tuple(replace(term, root=term.root[:, term.root.any(axis=0)]) for term in terms if term.root.any()),
             attached=tuple(int(numbers[place]) for place in self.attached if stays[place]),
