@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 END = "-1"  # alone on its line: a data set begins or ends
+UNOPENED = "a data set {} begins without the line of -1 above it; put it there, or export the file again"
 LARGEST = 999_999_999  # integer of a field of ten columns
 
 
@@ -167,8 +168,7 @@ def read_data_sets(path: Path, kinds: Collection[str], *, advice: str) -> list[D
     for end, begin in zip(marks[1::2], [*marks[2::2], len(lines)], strict=False):
         unopened = next((number for number in range(end + 1, begin) if lines[number].strip() in kinds), None)
         if unopened is not None:
-            problem = f"a data set {lines[unopened].strip()} begins without the line of -1 above it; put it there"
-            raise FileFormatError(path, f"{problem}, or export the file again", where=f"line {unopened + 1}")
+            raise FileFormatError(path, UNOPENED.format(lines[unopened].strip()), where=f"line {unopened + 1}")
     return [
         DataSet(path=path, lines=lines, kind=kind, first=begin + 2, end=end, advice=advice)
         for begin, end in zip(marks[::2], [*marks[1::2], len(lines)], strict=False)

@@ -17,6 +17,7 @@ from frf_ipz.arrays import complex_array
 from frf_ipz.dofs import DIRECTIONS, Dof
 from frf_ipz.errors import FileFormatError
 from frf_ipz.text_numbers import NumberError, parse_numbers
+from frf_ipz.universal_sets import UNOPENED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -218,8 +219,7 @@ class _Lines:
             if text == "-1":
                 return True
             if BEGINS_SET.fullmatch(text):
-                problem = f"a data set {text[:3].strip()} begins without the line of -1 above it; put it there"
-                raise self.fault(f"{problem}, or export the file again")
+                raise self.fault(UNOPENED.format(text[:3].strip()))
         return False
 
     def fault(self, problem: str, line: int = 0) -> FileFormatError:
