@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import frf_ipz
+from frf_ipz.ingest.signals.faults import find_missing_ringing
+from frf_ipz.ingest.signals.pulses import find_pulse
 from synthetic_campaign import Structure, impact, in_memory
 
 STEP_S, BEFORE = 1 / 2048, 512
@@ -47,3 +49,11 @@ def test_what_is_cut_off_before_the_pulse_is_in_the_variance():
     truth = structure.accelerance(frfs.s[band])
     error, deviation = np.abs(frfs.values[band] - truth), np.sqrt(frfs.variance[band])
     assert np.sqrt(np.mean((error / deviation) ** 2)) == pytest.approx(1.0, abs=0.3)
+
+
+def test_what_a_force_does_after_its_pulse_is_not_before_it():
+    """A pulse that rises from nothing, and a hammer that swings after it for longer than the record has before."""
+    after = np.arange(-75, 8117)
+    force = 250.0 * np.exp(-((after / 12.0) ** 2)) + 5.0 * (after > 0) * np.exp(-after / 400.0) * np.sin(after / 40.0)
+    missing = find_missing_ringing(force, find_pulse(force, threshold=0.04 * 250))
+    assert np.abs(missing).max() < 1e-6

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.ingest.signals.clipping import EQUAL, digital_step
-from frf_ipz.ingest.signals.pulses import pulse_extent, quiet_length
+from frf_ipz.ingest.signals.pulses import RINGING, pulse_extent, quiet_length
 
 if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
@@ -66,7 +66,9 @@ def find_missing_ringing(force: FloatArray, pulse: Pulse) -> tuple[float, ...]:
     """Find what a filter may have rung before a record that begins just before its pulse.
 
     A filter without distortion of phase, as analysers have, rings before a pulse as it does after it. Fewer quiet
-    samples before the pulse than show that it has ended do not show that nothing has been cut off.
+    samples before the pulse than show that it has ended do not show that nothing has been cut off. What a force does
+    after its pulse for other reasons (a slow return to zero, a hammer that swings) is not before it: the samples
+    that are there tell by how much less.
 
     Parameters
     ----------
@@ -78,7 +80,8 @@ def find_missing_ringing(force: FloatArray, pulse: Pulse) -> tuple[float, ...]:
     Returns
     -------
     tuple of float
-        The samples before the first one, a mirror image of those after the pulse; 0 where there is nothing.
+        The samples before the first one, a mirror image of those after the pulse, as much smaller as the first
+        samples are than theirs; 0 where there is nothing.
 
     Examples
     --------
@@ -92,8 +95,14 @@ def find_missing_ringing(force: FloatArray, pulse: Pulse) -> tuple[float, ...]:
     """
     start, stop = pulse_extent(force, pulse)
     quiet = quiet_length(pulse)
-    mirrored = (force - pulse.base)[2 * pulse.peak + 1 : stop][:quiet]
-    return tuple(mirrored[::-1].tolist()) if start < quiet and len(mirrored) else (0.0,)
+    around = force - pulse.base
+    mirrored = around[2 * pulse.peak + 1 : stop][:quiet]
+    if start >= quiet or not len(mirrored):
+        return (0.0,)
+    first = around[: min(RINGING, pulse.peak)]
+    after = around[2 * pulse.peak + 1 - len(first) : 2 * pulse.peak + 1]
+    share = min(1.0, float(np.linalg.norm(first)) / max(float(np.linalg.norm(after)), np.finfo(float).tiny))
+    return tuple((share * mirrored[::-1]).tolist())
 
 
 def find_dropout(signal: FloatArray) -> tuple[int, int]:

@@ -32,6 +32,7 @@ NARROWEST = 1.5  # samples of smoothing: below this a filter's ringing comes thr
 WIDE = 5.0  # samples of a pulse that is wider than what a filter makes of the shortest one
 REACH = 6  # widths within which a bump must stand out from both sides
 SEPARATION = 2  # widths between the first pulse and a bump that is distinct from it
+RINGING = 6  # samples in which a filter rings through zero
 SIGNIFICANT = 8.0  # standard deviations of the smoothed noise
 ONSET = 0.05  # of the peak
 BAND_LEVEL = 0.1  # of the spectrum's largest modulus, 20 dB below it: the end of a hammer's band [Halvorsen1977]
@@ -142,7 +143,7 @@ def quiet_length(pulse: Pulse) -> int:
     int
         A filter rings through zero faster than that.
     """
-    return max(6, int(3 * pulse.width))
+    return max(RINGING, int(3 * pulse.width))
 
 
 def force_band(pulse: FloatArray) -> float:

@@ -211,6 +211,8 @@ def test_a_linear_cause_beside_a_law_has_to_relieve_the_model(
         "fit_null_model": lambda _: SimpleNamespace(log_evidence=0.0),
         "search_component": lambda *_: SimpleNamespace(best=spring, fits=(spring,)),
         "is_significant": lambda *_: True,
+        "assess_goodness": lambda *_: None,
+        "required_log_bayes_factor": lambda *_: 30.0,
         "with_change": lambda *_: "changed model",
         "undo_chain_effects": lambda *_: "restored",
         "rank_effects": lambda *_: ["spring"],
