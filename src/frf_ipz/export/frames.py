@@ -122,7 +122,11 @@ FRAMES: dict[type, dict[str, MakeFrame]] = {
         "stabilization": lambda fit: fit.stabilization,
     },
     Pairs: {"pairs": _of(run_tables.pair_table)},
-    UpdatedModel: {"parameters": _of(run_tables.history_table), "parts": lambda updated: updated.parts},
+    UpdatedModel: {
+        "parameters": _of(run_tables.history_table),
+        "parts": lambda updated: updated.parts,
+        "masses": lambda updated: updated.masses,
+    },
     Prediction: {"poi_frf": _of(run_tables.prediction_table)},
     Assessment: {"checks": _checks},
     Diagnosis: {

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from scipy.special import ndtri
 
 from frf_ipz.visible_text import counted
@@ -20,8 +21,11 @@ CHANCE = 0.05  # that of nodes without a mass any one is named
 BAND = (0.05, 0.95)
 
 
-def name_local_masses(basis: ParameterBasis, draws: FloatArray, *, n_without_counterpart: int = 0) -> tuple[str, ...]:
-    """Name the nodes whose masses are surely off, the largest first.
+COLUMNS = ("node", "mass_kg", "mass_kg_low", "mass_kg_high")
+
+
+def find_local_masses(basis: ParameterBasis, draws: FloatArray) -> pd.DataFrame:
+    """Find the nodes whose masses are surely off, the largest first.
 
     Parameters
     ----------
@@ -29,28 +33,46 @@ def name_local_masses(basis: ParameterBasis, draws: FloatArray, *, n_without_cou
         Parameters of the update.
     draws : (m, p) array
         Of the parameters, from the posterior.
+
+    Returns
+    -------
+    DataFrame
+        One row a node: ``node``, ``mass_kg``, and the 90 % interval ``mass_kg_low``, ``mass_kg_high``, kg; none where
+        no mass is surely off, or nothing was drawn.
+    """
+    places = np.array(list(basis.at_nodes), int)
+    if not len(places) or len(draws) < 2:
+        return pd.DataFrame(columns=list(COLUMNS))
+    kilograms = draws[:, places] * basis.moving_kg
+    means, stds = kilograms.mean(axis=0), kilograms.std(axis=0)
+    is_sure = np.abs(means) > -ndtri(CHANCE / 2 / len(places)) * stds
+    named = [place for place in np.argsort(-np.abs(means)) if is_sure[place]]
+    ends = np.quantile(kilograms, BAND, axis=0)
+    nodes = [str(basis.at_nodes[int(places[place])]) for place in named]
+    values = (nodes, means[named], ends[0, named], ends[1, named])
+    return pd.DataFrame(dict(zip(COLUMNS, values, strict=True)))
+
+
+def local_mass_notes(masses: pd.DataFrame, *, n_without_counterpart: int = 0) -> tuple[str, ...]:
+    """Say what a user has to know of masses at nodes.
+
+    Parameters
+    ----------
+    masses : DataFrame
+        As `find_local_masses` gives them.
     n_without_counterpart : int
         Measured poles that the model has none for: then masses may stand for what is missing.
 
     Returns
     -------
     tuple of str
-        One sentence with all of them; none where no mass is surely off, or nothing was drawn.
+        One sentence with all of them; none where there are none.
     """
-    places = np.array(list(basis.at_nodes), int)
-    if not len(places) or len(draws) < 2:
+    if not len(masses):
         return ()
-    kilograms = draws[:, places] * basis.moving_kg
-    means, stds = kilograms.mean(axis=0), kilograms.std(axis=0)
-    is_sure = np.abs(means) > -ndtri(CHANCE / 2 / len(places)) * stds
-    named = [place for place in np.argsort(-np.abs(means)) if is_sure[place]]
-    if not named:
-        return ()
-    ends = np.quantile(kilograms, BAND, axis=0)
-    nodes = [basis.at_nodes[int(places[place])] for place in named]
     found = [
-        f"{means[place]:+.2g} kg at node {node} (90 %: {ends[0, place]:+.2g} to {ends[1, place]:+.2g} kg)"
-        for place, node in zip(named, nodes, strict=True)
+        f"{mass:+.2g} kg at node {node} (90 %: {low:+.2g} to {high:+.2g} kg)"
+        for node, mass, low, high in masses[list(COLUMNS)].itertuples(index=False)
     ]
     doubt = ""
     if n_without_counterpart:

@@ -89,6 +89,9 @@ class UpdatedModel(Tabulated, Drawn):
     parts : DataFrame
         Change of the stiffness of every part of the FE model, as `along_structure.change_along_structure` gives it;
         empty where the method has not changed parts.
+    masses : DataFrame
+        Masses at nodes that the nominal model lacks, or has too much of, as `local_masses.find_local_masses` gives
+        them; empty where none is sure.
     scale, nominal_scale : MeasuredScale
         Gains of the measured FRFs over the updated and the nominal model, where the test does not know its scale;
         else gains of 1 whose draws carry the doubt of the model's mass.
@@ -133,6 +136,7 @@ class UpdatedModel(Tabulated, Drawn):
     unmet: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     parts: pd.DataFrame = field(default_factory=lambda: pd.DataFrame())
+    masses: pd.DataFrame = field(default_factory=lambda: pd.DataFrame())
     scale: MeasuredScale = field(default_factory=MeasuredScale)
     nominal_scale: MeasuredScale = field(default_factory=MeasuredScale)
     pairs: Pairs | None = None

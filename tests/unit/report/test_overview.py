@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from frf_ipz.pairing.pairs import PairVerdict
@@ -58,6 +59,16 @@ def test_roots_that_the_model_lacks_are_counted(run):
     )
     figure = card(with_results(run, pairs=replace(run.pairs, rows=rows)), "Missing in the model").figure
     assert figure == "2 poles and zeros"
+
+
+def test_masses_that_the_update_found_are_missing_in_the_model(run):
+    kilograms = [0.012, -0.008, 0.005, 0.002]
+    masses = pd.DataFrame(
+        {"node": list("2468"), "mass_kg": kilograms, "mass_kg_low": kilograms, "mass_kg_high": kilograms}
+    )
+    found = card(with_results(run, updated_model=replace(run.updated_model, masses=masses)), "Missing in the model")
+    assert found.figure.startswith("4 masses")
+    assert "+0.012 kg at node 2, -0.008 kg at node 4, +0.005 kg at node 6 and 1 other" in found.meaning
 
 
 def test_errors_are_stated_with_the_gains_that_are_fitted(run):

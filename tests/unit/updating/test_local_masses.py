@@ -5,7 +5,7 @@ import pytest
 
 import frf_ipz
 from clamped_beam import BEAM
-from frf_ipz.updating.local_masses import name_local_masses
+from frf_ipz.updating.local_masses import find_local_masses, local_mass_notes
 from frf_ipz.updating.methods import minimal_change
 from frf_ipz.updating.parameters import make_structural_basis
 
@@ -102,9 +102,12 @@ def test_one_of_many_masses_of_nothing_is_hardly_ever_named(beam):
     assert np.shares_memory(without.stiffness, basis.stiffness)  # matrices of hundreds of parameters are large
     rng = np.random.default_rng(5)
     draws = rng.standard_normal((400, 200, len(basis.names))) + rng.standard_normal((400, 1, len(basis.names)))
-    named = np.mean([bool(name_local_masses(basis, of_one)) for of_one in draws])
+    named = np.mean([len(find_local_masses(basis, of_one)) > 0 for of_one in draws])
     assert 0.01 < named < 0.12
-    assert name_local_masses(basis, draws[0] + 9.0)
-    assert not name_local_masses(basis, draws[0][:0])
-    (said,) = name_local_masses(basis, draws[0] + 9.0, n_without_counterpart=2)
+    found = find_local_masses(basis, draws[0] + 9.0)
+    assert len(found)
+    assert (found.mass_kg_low < found.mass_kg).all()
+    assert (found.mass_kg < found.mass_kg_high).all()
+    assert not len(find_local_masses(basis, draws[0][:0]))
+    (said,) = local_mass_notes(found, n_without_counterpart=2)
     assert "2 measured poles have no counterpart, so that they may stand for something else that is missing" in said

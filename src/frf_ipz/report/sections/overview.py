@@ -19,6 +19,8 @@ from frf_ipz.visible_text import counted, written_out
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import pandas as pd
+
     from frf_ipz.assessment.assessment import Assessment, Check
     from frf_ipz.runs.results import Results
     from frf_ipz.updating.targets import Target
@@ -29,6 +31,7 @@ VERDICTS = {
     Verdict.NOT_USABLE: "Not usable",
 }
 BESIDE = frozenset({"causes"})  # only where a diagnosis finds any: an old one may be left over
+MOST_MASSES = 3  # named on the card
 NO_ERROR = 1e-5  # a smaller error of a frequency interests nobody
 
 
@@ -252,4 +255,14 @@ def _missing_card(run: Results) -> Card:
     lacking = sum(count.missing for count in counts)
     figure = counted(lacking, "pole or zero", "poles and zeros") if lacking else "not looked for"
     meaning = "; ".join(count.text for count in counts if count.measured)
+    masses = None if run.updated_model is None else run.updated_model.masses
+    if masses is not None and len(masses):
+        figure = counted(len(masses), "mass", "masses") + (f", {figure}" if lacking else "")
+        meaning = f"the update found {_largest_masses(masses)}; {meaning}".removesuffix("; ")
     return Card("Missing in the model", figure, f"{meaning}; no diagnosis was run".removeprefix("; "))
+
+
+def _largest_masses(masses: pd.DataFrame) -> str:
+    named = [f"{row.mass_kg:+.2g} kg at node {row.node}" for row in masses.head(MOST_MASSES).itertuples()]
+    rest = len(masses) - len(named)
+    return written_out(", ".join(named) + (f" and {counted(rest, 'other')}" if rest else ""))

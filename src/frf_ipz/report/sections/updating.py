@@ -45,6 +45,7 @@ def build(run: Results) -> Section | None:
     tables = {"targets": _target_table(rows)} if rows else {}
     tables |= {"convergence": _iteration_table(updated)} if len(updated.history) else {}
     tables |= {"change": _part_table(parts)} if len(parts) else {}
+    masses = (_mass_table(updated.masses),) if len(updated.masses) else ()
     change = "change" if len(parts) else "flexibility"
     figures = run_figures(run, "targets", "convergence", change, "modal-change", tables=tables)
     lead = f"Method {updated.method}: {updated.status.value}. {counted(len(updated.history), 'iteration')}."
@@ -53,7 +54,7 @@ def build(run: Results) -> Section | None:
         anchor="updating",
         title="Updating",
         lead=lead,
-        blocks=tuple(figures),
+        blocks=(*figures, *masses),
         notes=(*[f"Cannot be met: {text}" for text in updated.unmet], *_notable(parts), *updated.warnings),
         choices=(*(() if reduced is None else reduced.choices), *_regularisation(updated)),
     )
@@ -101,6 +102,16 @@ def _part_table(parts: pd.DataFrame) -> Table:
         for name, *row in zip(parts["name"].astype(str), *values, strict=True)
     ]
     return Table(caption="Change of stiffness", columns=("part", "change", "low", "high"), rows=rows)
+
+
+def _mass_table(masses: pd.DataFrame) -> Table:
+    rows = [
+        [f"node {node}", *[f"{value:+.2g} kg" for value in kilograms]]
+        for node, *kilograms in masses[["node", "mass_kg", "mass_kg_low", "mass_kg_high"]].itertuples(index=False)
+    ]
+    return Table(
+        caption="Masses that the model lacks, or has too much of", columns=("at", "mass", "low", "high"), rows=rows
+    )
 
 
 def _regularisation(updated: UpdatedModel) -> list[str]:

@@ -21,7 +21,7 @@ from frf_ipz.late_imports import import_late
 from frf_ipz.numerics.low_rank import factorise
 from frf_ipz.updating.along_structure import part_table
 from frf_ipz.updating.gaussian import gain_of_further_terms
-from frf_ipz.updating.local_masses import name_local_masses
+from frf_ipz.updating.local_masses import find_local_masses, local_mass_notes
 from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
 from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble, draw_whitened, parameters_of
 from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate, log_evidence_of
@@ -115,12 +115,10 @@ class _Update:
         return replace(nominal, mass=mass, damping=damping, stiffness=stiffness)
 
     @cached_property
-    def local_masses(self) -> tuple[str, ...]:
+    def local_masses(self) -> pd.DataFrame:
         drawn = draw_whitened(self.posterior, np.random.default_rng(SEED), LEAST_DRAWS)
         draws = parameters_of(self.posterior, drawn)
-        return name_local_masses(
-            self.posterior.stiffness.basis, draws, n_without_counterpart=self.problem.n_without_counterpart
-        )
+        return find_local_masses(self.posterior.stiffness.basis, draws)
 
     @cached_property
     def log_evidence(self) -> float:
@@ -145,7 +143,7 @@ def _likelier(problem: UpdateProblem, frame: ModalFrame, options: UpdateOptions,
     if not _promises_masses(problem, basis, frame, unloaded):
         return unloaded
     loaded = _solve_with_masses(problem, frame, options, progress)
-    return loaded if loaded.local_masses and loaded.log_evidence > unloaded.log_evidence else unloaded
+    return loaded if len(loaded.local_masses) and loaded.log_evidence > unloaded.log_evidence else unloaded
 
 
 def _promises_masses(problem: UpdateProblem, basis: ParameterBasis, frame: ModalFrame, unloaded: _Update) -> bool:
@@ -349,7 +347,8 @@ def _updated(update_of: _Update, options: UpdateOptions) -> UpdatedModel:
         after=update_of.values,
         ensemble=ensemble,
         unmet=unmet_targets(posterior.stiffness_result, problem.names, update_of.excluded),
-        warnings=update_of.local_masses,
+        warnings=local_mass_notes(update_of.local_masses, n_without_counterpart=problem.n_without_counterpart),
+        masses=update_of.local_masses,
         parts=_parts(posterior.stiffness.basis, posterior.stiffness_result.theta, draws),
     )
 
