@@ -10,7 +10,8 @@
     └── NumericalError (RuntimeError)      the computation cannot give a result: exit status 1
         ├── ConvergenceError               an iteration stopped without reaching its goal; carries ``result``
         ├── PairingError                   measured and computed poles or zeros cannot be matched
-        └── IllConditionedError            a matrix is too close to singular to be used
+        └── IllConditionedError            a matrix is too close to singular to be used; a run, which knows the file
+                                           that it comes from, raises a FileFormatError in its place
 
 Every message says what was given, what was needed, and what to try.
 """
@@ -183,12 +184,25 @@ class PairingError(NumericalError):
 class IllConditionedError(NumericalError):
     """A matrix is too close to singular to be used.
 
+    Parameters
+    ----------
+    message : str
+        What is wrong with it, and what to do.
+    key : str
+        Key of the pipeline file that the message proposes to change; empty where the matrix itself has to be.
+
     Examples
     --------
     >>> import frf_ipz
     >>> issubclass(frf_ipz.IllConditionedError, frf_ipz.NumericalError)
     True
+    >>> frf_ipz.IllConditionedError("the modes can hardly be distinguished", key="reduce.dofs").key
+    'reduce.dofs'
     """
+
+    def __init__(self, message: str, *, key: str = "") -> None:
+        self.key = key
+        super().__init__(message)
 
 
 @contextmanager

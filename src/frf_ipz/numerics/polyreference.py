@@ -182,5 +182,6 @@ def _cholesky(R: ComplexArray) -> ComplexArray:
     except linalg.LinAlgError:
         raise IllConditionedError(
             f"the model order {len(R) - 1} of the stabilisation diagram is too high for the lines of the band; "
-            "set a lower [fit] max_order"
+            "set a lower [fit] max_order",
+            key="fit.max_order",
         ) from None

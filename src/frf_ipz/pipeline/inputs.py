@@ -89,11 +89,16 @@ class PipelineInputs:
         return [*files, self.test.nominal_damping_ratio, sorted(self.test.sensor_masses.items())]
 
     @property
+    def model_file(self) -> str:
+        """Where the FE model is described, for messages."""
+        return next(iter(self.model_names), "FE model")
+
+    @property
     def places_of_mistakes(self) -> PlacesOfMistakes:
         """Where a mistake of the user's would stand."""
         return {
             "test_file": self.test.path.name,
-            "model_file": Path(next(iter(self.model_names), "FE model")).name,
+            "model_file": Path(self.model_file).name,
             "is_recorded": self.test.kind not in {"frf", "modes"},
         }
 

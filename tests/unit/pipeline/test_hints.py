@@ -1,15 +1,20 @@
 """Where numbers end in no result, what most likely has to be corrected is said with its file and key."""
 
+import re
+
 import pytest
+from scipy import io
 
 import frf_ipz
-from frf_ipz.errors import InputError, NoModesError, NumericalError
+from frf_ipz.errors import FileFormatError, IllConditionedError, InputError, NoModesError, NumericalError
 from frf_ipz.pipeline.inputs import read_inputs
 from frf_ipz.pipeline.stages.hints import naming_exchanged_columns, naming_the_cause
 from small_campaign import write_campaign
 
+NO_END = NumericalError("the numbers have no end")
 
-def fail_with(folder, change):
+
+def fail_with(folder, change, error=NO_END):
     """Let a stage after the fit of a small campaign fail, whose model was changed."""
     pipeline = write_campaign(folder)
     model = folder / "model.toml"
@@ -18,7 +23,7 @@ def fail_with(folder, change):
     estimate = frf_ipz.estimate_frfs(inputs.test)
     fit = frf_ipz.fit_modes(estimate.frfs, options=inputs.options.fit)
     with naming_the_cause(inputs, estimate, fit, inputs.fe_model):
-        raise NumericalError("the numbers have no end")
+        raise error
 
 
 def test_a_wrong_unit_of_the_model_is_an_error_of_the_input(tmp_path):
@@ -37,6 +42,31 @@ def test_a_wrong_unit_of_the_model_is_an_error_of_the_input(tmp_path):
 def test_without_a_likely_cause_the_error_stays_what_it_is(tmp_path):
     with pytest.raises(NumericalError, match=r"^the numbers have no end$"):
         fail_with(tmp_path, lambda text: text)
+
+
+@pytest.mark.parametrize(
+    ("key", "place"), [("", "model.toml: the modes"), ("reduce.dofs", "pipeline.toml, key 'reduce.dofs': the modes")]
+)
+def test_matrices_that_cannot_be_computed_with_are_an_error_of_their_file(tmp_path, key, place):
+    error = IllConditionedError("the modes can hardly be told apart", key=key)
+    with pytest.raises(FileFormatError, match=f"{re.escape(place)} can hardly be told apart$"):
+        fail_with(tmp_path, lambda text: text, error)
+
+
+@pytest.mark.parametrize("diagnosis", ["", '[diagnose]\nrun = "always"\n', "[diagnose]\napply = true\n"])
+def test_a_run_names_the_file_of_a_stiffness_of_few_digits(tmp_path, diagnosis):
+    pipeline = write_campaign(tmp_path)
+    beam = frf_ipz.read_model(tmp_path / "model.toml")
+    for name, matrix, digits in (("M", beam.mass, 17), ("K", beam.stiffness, 4)):
+        io.mmwrite(tmp_path / f"{name}.mtx", matrix, precision=digits)
+    rows = [f"{dof.node},{dof.direction},{0.025 * (dof.node - 1)},0,0" for dof in beam.dofs]
+    (tmp_path / "dofs.csv").write_text("\n".join(["node,direction,x_m,y_m,z_m", *rows]))
+    matrices = 'mass = "M.mtx"\nstiffness = "K.mtx"\ndofs = "dofs.csv"\n'
+    (tmp_path / "model.toml").write_text(f'[model]\nkind = "matrices"\n[matrices]\n{matrices}')
+    if diagnosis:
+        pipeline.write_text(pipeline.read_text().replace('[diagnose]\nrun = "never"\n', diagnosis))
+    with pytest.raises(FileFormatError, match=r"model\.toml: the stiffness of the model .* is printed with about 4"):
+        frf_ipz.run_pipeline(pipeline, tmp_path / "run")
 
 
 def fail_to_fit(folder, change):

@@ -296,7 +296,8 @@ def _retained_rows(model: StructuralModel, ritz: _Ritz, plan: ReductionPlan, not
         if condition_number(ritz.motions[rows]) > MAX_CONDITION:
             raise IllConditionedError(
                 f"{count} modes and residual vectors cannot be distinguished at any DOFs of the model '{model.name}'; "
-                "use fewer ([reduce] modes)"
+                "use fewer ([reduce] modes)",
+                key="reduce.modes",
             )
         notes.append("dofs: " + ", ".join(ritz.dofs[row].name for row in rows.tolist()))
     retained = {ritz.dofs[row] for row in rows.tolist()}
@@ -329,7 +330,8 @@ def _require_condition(ritz: _Ritz, rows: IntArray, plan: ReductionPlan) -> None
         names = ", ".join(f'"{ritz.dofs[row].name}"' for row in better.tolist())
         raise IllConditionedError(
             f"[reduce] dofs: the modes can hardly be distinguished at these DOFs (condition number {condition:.2g}, at "
-            f"most {MAX_CONDITION:g}); better is dofs = [{names}] ({condition_number(ritz.motions[better]):.2g})"
+            f"most {MAX_CONDITION:g}); better is dofs = [{names}] ({condition_number(ritz.motions[better]):.2g})",
+            key="reduce.dofs",
         )
 
 
@@ -381,14 +383,16 @@ def _require_modes(mass: FloatArray, stiffness: FloatArray, ritz: _Ritz) -> None
     except linalg.LinAlgError:
         raise IllConditionedError(
             "rounding leaves the reduced mass matrix not positive definite; use fewer modes, "
-            "or DOFs that are farther apart ([reduce] modes, dofs)"
+            "or DOFs that are farther apart ([reduce] modes, dofs)",
+            key="reduce.modes",
         ) from None
     elastic = slice(ritz.n_rigid, ritz.n_modes)
     error = np.abs(eigenvalues[elastic] / ritz.eigenvalues[elastic] - 1).max(initial=0.0)
     if error > EIGENVALUE_TOLERANCE:
         raise IllConditionedError(
             f"rounding in the reduced matrices shifts a mode's omega^2 by {error:.1g} of its value; use fewer modes, "
-            "or DOFs that are farther apart ([reduce] modes, dofs)"
+            "or DOFs that are farther apart ([reduce] modes, dofs)",
+            key="reduce.modes",
         )
 
 

@@ -6,7 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
-from frf_ipz.errors import FrfIpzError, InputError, NoModesError, NumericalError
+from frf_ipz.errors import (
+    FileFormatError,
+    FrfIpzError,
+    IllConditionedError,
+    InputError,
+    NoModesError,
+    NumericalError,
+)
 from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
@@ -47,14 +54,39 @@ def naming_the_cause(
     Raises
     ------
     InputError
-        Where there is a likely cause; else the error of the stage goes on.
+        Where there is a likely cause, or matrices of the model are at fault; else the error of the stage goes on.
     """
     try:
         yield
     except NumericalError as error:
         impacts = inputs.impacts(recordings)
         cause = likely_cause(recordings.frfs, fit, fe_model, impacts=impacts, **inputs.places_of_mistakes)
-        _raise_with(cause, error, inputs)
+        _raise_with(cause, error, inputs, file=inputs.model_file)
+
+
+@contextmanager
+def naming_the_model(inputs: PipelineInputs) -> Iterator[None]:
+    """Name the model's file where its matrices are at fault: that is an error of the input.
+
+    Parameters
+    ----------
+    inputs : PipelineInputs
+        What is worked on.
+
+    Yields
+    ------
+    None
+        While something is computed with the model.
+
+    Raises
+    ------
+    InputError
+        Where matrices are at fault.
+    """
+    try:
+        yield
+    except IllConditionedError as error:
+        _raise_with(None, error, inputs, file=inputs.model_file)
 
 
 @contextmanager
@@ -76,17 +108,22 @@ def naming_exchanged_columns(inputs: PipelineInputs, recordings: FrfEstimate) ->
     Raises
     ------
     InputError
-        Where the columns are exchanged; else the error of the fit goes on.
+        Where the columns are exchanged, or the FRFs leave nothing to solve; else the error of the fit goes on.
     """
     try:
         yield
     except (NoModesError, NumericalError) as error:
         test_file = inputs.places_of_mistakes["test_file"]
         cause = find_exchanged_columns(inputs.impacts(recordings), recordings.frfs.labels, test_file=test_file)
-        _raise_with(cause, error, inputs)
+        _raise_with(cause, error, inputs, file=str(inputs.test.path))
 
 
-def _raise_with(cause: LikelyCause | None, error: FrfIpzError, inputs: PipelineInputs) -> NoReturn:
-    if cause is None:
+def _raise_with(cause: LikelyCause | None, error: FrfIpzError, inputs: PipelineInputs, *, file: str) -> NoReturn:
+    """Raise an error with its likely cause, or with the file whose matrices are at fault."""
+    if cause is not None:
+        raise InputError(f"{inputs.source}: {error}; most likely {cause.says} ({cause.place})") from error
+    if not isinstance(error, IllConditionedError):
         raise error
-    raise InputError(f"{inputs.source}: {error}; most likely {cause.says} ({cause.place})") from error
+    if error.key:
+        raise FileFormatError(inputs.source, str(error), where=f"key '{error.key}'") from error
+    raise FileFormatError(file, str(error)) from error

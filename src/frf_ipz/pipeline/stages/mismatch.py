@@ -14,6 +14,7 @@ from frf_ipz.ingest.estimation.frf_files import read_frf_levels
 from frf_ipz.input_files import entering
 from frf_ipz.late_imports import import_late
 from frf_ipz.output_files import write_text
+from frf_ipz.pipeline.stages.hints import naming_the_model
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -61,6 +62,11 @@ def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet, *, is_as
     -------
     Diagnosis
         The verdict and what it rests on.
+
+    Raises
+    ------
+    InputError
+        If the model cannot be computed with.
     """
     inputs = runner.inputs
     options = inputs.options.diagnose
@@ -80,12 +86,13 @@ def diagnose(runner: StageRunner, model: StructuralModel, frfs: FrfSet, *, is_as
             progress=words,
         )
 
-    return runner.stage(
-        "diagnose",
-        _rests_on(runner, run, seconds),
-        compute,
-        lambda result: {"diagnosis.json": partial(_write_json, result.to_json())},
-    )
+    with naming_the_model(inputs):
+        return runner.stage(
+            "diagnose",
+            _rests_on(runner, run, seconds),
+            compute,
+            lambda result: {"diagnosis.json": partial(_write_json, result.to_json())},
+        )
 
 
 @dataclass(kw_only=True, eq=False)
