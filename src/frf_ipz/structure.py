@@ -645,7 +645,8 @@ class StructuralModel(Drawn):
         if dof.unsigned in self.held_dofs:
             return (
                 f"the DOF {dof.name} is held in the model '{self.name}': its row of the matrices is that of a support "
-                "or of a mass that couples to nothing, so nothing moves there with the structure; use another DOF"
+                "or of a mass that couples to nothing, so nothing moves there with the structure; use another DOF, or "
+                "take the row as it is by [matrices] held = 'keep'"
             )
         directions = [known.direction for known in self.all_dofs if known.node == dof.node]
         if directions:

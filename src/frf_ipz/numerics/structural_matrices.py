@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from contextlib import AbstractContextManager
 
-    from frf_ipz.arrays import FloatArray, Matrix
+    from frf_ipz.arrays import BoolArray, FloatArray, Matrix
 
 DOFS_SHOWN = 6
 HELD = "held"
@@ -66,7 +66,7 @@ class FreeRows:
         return {dof.node: "pinned" if dof.node in moving else "clamped" for dof in self.held_dofs}
 
 
-def select_free_rows(matrices: Mapping[str, Matrix], dofs: Sequence[Dof], *, held: str) -> FreeRows:
+def select_free_rows(matrices: Mapping[str, Matrix], dofs: Sequence[Dof], options: MatrixOptions) -> FreeRows:
     """Tell the rows of free DOFs from those that are left in matrices for held ones.
 
     Parameters
@@ -75,8 +75,8 @@ def select_free_rows(matrices: Mapping[str, Matrix], dofs: Sequence[Dof], *, hel
         ``mass``, ``stiffness`` and perhaps damping, of all rows; they need not be symmetric.
     dofs : sequence of Dof
         The DOF of each row.
-    held : str
-        ``auto``, or ``keep`` to take all rows as they are.
+    options : MatrixOptions
+        Whether held ones are told, and the units.
 
     Returns
     -------
@@ -93,24 +93,30 @@ def select_free_rows(matrices: Mapping[str, Matrix], dofs: Sequence[Dof], *, hel
         require_finite("the matrices", matrix.data)
     further = [matrix for what, matrix in matrices.items() if what not in ("mass", "stiffness")]
     marks = find_held_rows(mass, stiffness, *further)
-    if held == "keep" or not marks.any.any():
+    if options.held == "keep":
         return FreeRows(rows=np.arange(len(dofs)), dofs=tuple(dofs), held_dofs=(), notes=())
+    hz = np.sqrt(np.abs(stiffness.diagonal()) / np.where(mass.diagonal() != 0, np.abs(mass.diagonal()), np.inf))
+    hz /= 2 * np.pi * options.units.time_s
     notes = []
     for ways, why, rows in (
         ("zero in mass and stiffness", HELD, marks.zero),
         ("those of the identity", HELD, marks.identity),
         (*_loose_masses(mass.diagonal()[marks.loose]), marks.loose),
+        (f"alone in mass and stiffness, {_shared_hz(hz[marks.shared])}", "held, or joined to nothing", marks.shared),
         ("marked by a penalty on the diagonal", HELD, marks.penalty),
     ):
-        names = [dofs[row].name for row in np.flatnonzero(rows).tolist()]
-        if names:
-            shown = ", ".join(names[:DOFS_SHOWN]) + (", ..." if len(names) > DOFS_SHOWN else "")
-            rows_are = "1 row is" if len(names) == 1 else f"{len(names)} rows are"
-            dofs_are = "this DOF is" if len(names) == 1 else "these DOFs are"
+        if rows.any():
+            dofs_are = "this DOF is" if np.count_nonzero(rows) == 1 else "these DOFs are"
             notes.append(
-                f"{rows_are} {ways} ({shown}): {dofs_are} {why}, and left out; [matrices] held = 'keep' takes the rows "
-                "as they are"
+                f"{_count_rows(rows, dofs, ways)}: {dofs_are} {why}, and left out; [matrices] held = 'keep' takes the "
+                "rows as they are"
             )
+    if marks.lone.any():
+        at = ", ".join(f"{value:.5g}" for value in hz[marks.lone][:DOFS_SHOWN])
+        notes.append(
+            f"{_count_rows(marks.lone, dofs, 'alone in mass and stiffness')}: kept, with a mode of its own at {at} "
+            "Hz; where the DOF is held, take the row out"
+        )
     free = np.flatnonzero(~marks.any)
     return FreeRows(
         rows=free,
@@ -118,6 +124,19 @@ def select_free_rows(matrices: Mapping[str, Matrix], dofs: Sequence[Dof], *, hel
         held_dofs=tuple(dofs[row] for row in np.flatnonzero(marks.any).tolist()),
         notes=tuple(notes),
     )
+
+
+def _count_rows(rows: BoolArray, dofs: Sequence[Dof], ways: str) -> str:
+    """Say how many rows are in which way, and the first of their DOFs."""
+    names = [dofs[row].name for row in np.flatnonzero(rows).tolist()]
+    shown = ", ".join(names[:DOFS_SHOWN]) + (", ..." if len(names) > DOFS_SHOWN else "")
+    return f"{'1 row is' if len(names) == 1 else f'{len(names)} rows are'} {ways} ({shown})"
+
+
+def _shared_hz(hz: FloatArray) -> str:
+    """Say at which frequencies rows are that share theirs with others."""
+    texts = list(dict.fromkeys(f"{value:.5g}" for value in np.sort(hz)))
+    return f"all at {texts[0]} Hz" if len(texts) == 1 else f"several at each of {', '.join(texts[:DOFS_SHOWN])} Hz"
 
 
 def _loose_masses(masses: FloatArray) -> tuple[str, str]:
@@ -342,7 +361,7 @@ class ModelMatrices:
         whole["stiffness"], imaginary = _real_and_imaginary(matrices["stiffness"])
         if imaginary is not None:
             whole[STRUCTURAL] = imaginary
-        free = select_free_rows(whole, dofs, held=options.held)
+        free = select_free_rows(whole, dofs, options)
         exported = ExportedRows.of(free, options)
         rounding = printed_rounding(whole["stiffness"][free.rows][:, free.rows].data)
         notes = list(free.notes)

@@ -74,6 +74,8 @@ HOLDS = {
     "identity in the stiffness, mass as it was": stiffness_only,
     "identity, rows cleared only": one_side(rows=True, columns=False),
     "identity, columns cleared only": one_side(rows=False, columns=True),
+    "two scales": both(3.7e6, 8.2e-3),
+    "masses of their own, stiffnesses in proportion": both([3.7e4, 1.48e2], [0.25, 1e-3]),
     "1e36": penalty(1e36),
     "1e30": penalty(1e30),
     "1e20": penalty(1e20),
@@ -162,6 +164,40 @@ def test_a_damper_alone_may_join_a_mass_to_the_structure():
     mass = np.diag([1.0, 2.0, 1.0, 1.0])
     made = frf_ipz.StructuralModel.from_matrices(mass, WITHOUT_SPRING, damping=joined, dofs=dofs)
     assert made.dofs == tuple(dofs[:3])
+
+
+TWO_OF_EACH = np.diag([0, 0, 3.7e6, 3.7e6, 5.1e4, 5.1e4]), np.diag([1.0, 2.0, 8e-3, 8e-3, 2e-3, 2e-3])
+
+
+def test_rows_that_are_held_with_the_diagonals_they_had_are_left_out_where_several_are_alike():
+    stiffness, mass = TWO_OF_EACH
+    stiffness[:2, :2] = [[2e6, -1e6], [-1e6, 1e6]]
+    dofs = [frf_ipz.Dof(node, name) for node in (1, 2, 3) for name in ("z", "ry")]
+    made = frf_ipz.StructuralModel.from_matrices(mass, stiffness, dofs=dofs, units="mm-t-s")
+    assert made.dofs == tuple(dofs[:2])
+    frequencies = ", ".join(f"{np.sqrt(stiffness[row, row] / mass[row, row]) / 2 / np.pi:.5g}" for row in (4, 2))
+    assert f"4 rows are alone in mass and stiffness, several at each of {frequencies} Hz" in made.notes[0]
+    assert "held, or joined to nothing, and left out" in made.notes[0]
+
+
+def test_one_row_alone_stays_and_is_said():
+    """A mass on a spring of its own cannot be told from a held DOF; its frequency is 1000 times as high per ms."""
+    stiffness = np.array([[2e6, -1e6, 0], [-1e6, 1e6, 0], [0, 0, 4e4]])
+    dofs = [frf_ipz.Dof(node, "z") for node in (1, 2, 3)]
+    for units, hz in (("SI", 100.66), ("mm-kg-ms", "1.0066e+05")):
+        made = frf_ipz.StructuralModel.from_matrices(np.diag([1.0, 2.0, 0.1]), stiffness, dofs=dofs, units=units)
+        assert made.dofs == tuple(dofs)
+        assert f"1 row is alone in mass and stiffness (3:z): kept, with a mode of its own at {hz} Hz" in made.notes[0]
+
+
+def test_a_damper_joins_rows_of_one_frequency_to_the_structure():
+    stiffness = np.diag([0.0, 0.0, 4e4, 4e4])
+    stiffness[:2, :2] = [[2e6, -1e6], [-1e6, 1e6]]
+    joined = np.zeros((4, 4))
+    joined[np.ix_([1, 2], [1, 2])] = joined[np.ix_([0, 3], [0, 3])] = [[5.0, -5.0], [-5.0, 5.0]]
+    mass = np.diag([1.0, 2.0, 0.1, 0.1])
+    dofs = [frf_ipz.Dof(node, "z") for node in range(1, 5)]
+    assert frf_ipz.StructuralModel.from_matrices(mass, stiffness, damping=joined, dofs=dofs).dofs == tuple(dofs)
 
 
 def test_rows_are_taken_as_they_are_where_the_user_says_so(tmp_path):
