@@ -14,6 +14,7 @@ from synthetic_campaign import HIT, Structure, impact, in_memory, respond, write
 
 STEP_S = 1 / 2048
 NOISE = 0.02
+LOST_AT = 700
 HEIGHTS = (100.0, 60.0, 150.0, 80.0, 120.0)
 
 
@@ -141,6 +142,25 @@ def test_lost_samples_are_found_where_four_impacts_hardly_tell_that_one_is_wrong
     assert list(result.records.used) == [True, True, False, True]
     assert "40 samples are lost 0.2441 s after its beginning" in result.records.marks[2]
     assert truth_error(result).max() < 0.01
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_lost_samples_are_found_where_no_response_alone_tells_it_of_few_impacts(tmp_path, seed):
+    """The motion has partly died out, and the strikes scatter by 3 %, which the scatter of each response counts on."""
+    structure = Structure(
+        frequency_hz=(38.0, 88.0, 173.0, 215.0),
+        damping_ratio=(0.008, 0.007, 0.005, 0.006),
+        shapes=((1.0, 0.7, -0.5, 0.3), (0.6, -0.8, 0.9, -0.2), (0.3, 0.5, 0.4, 0.8), (-0.7, 0.2, 0.6, -0.5)),
+    )
+    rng = np.random.default_rng(seed)
+    for number in range(4):
+        signals = impact(structure, noise=NOISE, rng=rng, height=HEIGHTS[number])
+        signals[1:] *= 1 + 0.03 * (-1) ** number
+        signals = np.delete(signals, slice(LOST_AT, LOST_AT + 90), axis=1) if number == 2 else signals[:, :-90]
+        write_csv(tmp_path / "hits" / f"hit_{number + 1}.csv", signals, STEP_S)
+    result = estimate_frfs(read_test(write_test(tmp_path, HIT, n_outputs=4)))
+    assert list(result.records.used) == [True, True, False, True]
+    assert f"contradicts the other impacts: 90 samples are lost {LOST_AT * STEP_S:.4g} s" in result.records.marks[2]
 
 
 @pytest.mark.parametrize(

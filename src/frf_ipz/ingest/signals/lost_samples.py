@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,27 @@ HALVINGS = 5  # of the end that is compared: motion may have decayed long before
 LONGEST = 4  # part of a record that may be lost: a quarter
 
 
-def find_lost_samples(measured: FloatArray, expected: FloatArray) -> tuple[int, int, float]:
+class LostSamples(NamedTuple):
+    """Where and by how many samples a signal begins to run ahead of what is expected.
+
+    Parameters
+    ----------
+    start, lost : int
+        First sample that runs ahead, and by how many; negative where samples came in.
+    share : float
+        Of the power of the difference that remains when this is allowed for.
+    before : float
+        Power of the difference relative to what is expected, until there over from there on. What a wrong FRF makes of
+        a force differs from its beginning on: this is near 1 then.
+    """
+
+    start: int
+    lost: int
+    share: float
+    before: float
+
+
+def find_lost_samples(measured: FloatArray, expected: FloatArray) -> LostSamples:
     """Find where and by how many samples a signal begins to run ahead of what is expected.
 
     Parameters
@@ -23,10 +43,8 @@ def find_lost_samples(measured: FloatArray, expected: FloatArray) -> tuple[int, 
 
     Returns
     -------
-    start, lost : int
-        First sample that runs ahead, and by how many; negative where samples came in.
-    share : float
-        Of the power of the difference that remains when this is allowed for.
+    LostSamples
+        That with the smallest share; none lost, and a share of 1, where nothing explains anything.
 
     Examples
     --------
@@ -36,7 +54,7 @@ def find_lost_samples(measured: FloatArray, expected: FloatArray) -> tuple[int, 
     (600, 30)
     """
     n = len(measured)
-    best = 0, 0, 1.0
+    best = LostSamples(0, 0, 1.0, 1.0)
     before = np.concatenate([[0.0], np.cumsum((measured - expected) ** 2)])
     if not before[-1]:
         return best
@@ -53,6 +71,12 @@ def find_lost_samples(measured: FloatArray, expected: FloatArray) -> tuple[int, 
         after = np.concatenate([[0.0], np.cumsum((measured - shifted) ** 2)])
         cost = before + after[-1] - after
         place = int(np.argmin(cost))
-        if lost and cost[place] / before[-1] < best[2]:
-            best = place, lost, float(cost[place] / before[-1])
+        if lost and cost[place] / before[-1] < best.share:
+            after_it = before[-1] - before[place]
+            until, from_there = before[place] * (energy[-1] - energy[place]), after_it * energy[place]
+            best = LostSamples(place, lost, float(cost[place] / before[-1]), _ratio(until, from_there))
     return best
+
+
+def _ratio(part: float, whole: float) -> float:
+    return float(part / whole) if whole > 0 else float("inf")

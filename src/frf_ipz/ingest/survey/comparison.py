@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.ingest.signals.decay import noise_power
-from frf_ipz.ingest.signals.lost_samples import find_lost_samples
+from frf_ipz.ingest.signals.lost_samples import LostSamples, find_lost_samples
 from frf_ipz.ingest.signals.windows import window_impact
 from frf_ipz.ingest.survey.contradictions import (
     FEWEST,
+    LEVEL,
     ImpactSpectra,
     compare_output,
     contradicts_pairwise,
@@ -149,11 +150,15 @@ def _compare_setup(
 ) -> tuple[list[RecordInfo], list[str]]:
     columns = [channel.column for channel in files.test.output_channels]
     comparisons = [_compare_output(files, survey, records, spectra, output) for output in range(len(columns))]
+    comparisons, losses = _without_lost_of_all(files, survey, records, spectra, comparisons)
     causes = [_name_causes(columns, spectra, comparisons, impact) for impact in range(len(records))]
     unlike: set[tuple[int, int]] = set()
     for impact, named in enumerate(causes):
         for output, comparison in enumerate(comparisons):
             if comparison is not None and named.get(output) == UNNAMED:
+                if (impact, output) in losses:
+                    named[output] = f"{CONTRADICTS}: {_say_lost(survey, losses[impact, output])}"
+                    continue
                 agreeing = [records[number] for number in comparison.agreeing]
                 lost = _find_lost(files, survey, agreeing, records[impact], output)
                 explained = _explain(survey, spectra, comparison, (impact, output), lost)
@@ -302,10 +307,62 @@ def _compare_output(
         if not without.explains(misfit, 1.0, n_tried):  # however well it is explained
             continue
         agreeing = [records[number] for number in without.agreeing]
-        _, lost, share = _find_lost(files, survey, agreeing, records[impact], output)
+        _, lost, share, _ = _find_lost(files, survey, agreeing, records[impact], output)
         if lost and without.explains(misfit, max(misfit * share, 1.0), n_tried):
             comparison = without
     return comparison
+
+
+def _without_lost_of_all(
+    files: RecordingFiles,
+    survey: Survey,
+    records: Sequence[RecordInfo],
+    spectra: ImpactSpectra,
+    comparisons: Sequence[OutputComparison | None],
+) -> tuple[list[OutputComparison | None], dict[tuple[int, int], LostSamples]]:
+    """Leave out impacts that lost the same samples at the same place in several responses.
+
+    Of few impacts no response alone may tell that. Errors that responses have in common are those of the force and of
+    where it was struck, and begin with the force: of a difference that does not, each response is a witness of its own.
+    The one that tells most finds the place and the number; the ratios of the others at these count.
+    """
+    found = list(comparisons)
+    lost: dict[tuple[int, int], LostSamples] = {}
+    for impact in range(len(records)):
+        misfits: dict[int, float] = {}
+        withouts: dict[int, OutputComparison] = {}
+        for output, comparison in enumerate(found):
+            if comparison is not None and impact in comparison.agreeing and len(comparison.agreeing) >= FEWEST:
+                withouts[output] = leave_out(spectra, output, comparison, impact)
+                response, noise = spectra.responses[impact, output], spectra.noise[impact, output]
+                misfits[output] = withouts[output].misfit(spectra.force[impact], response, noise)
+        if not _is_witnessed([withouts[output].log_ratio(misfits[output], 1.0) for output in misfits], len(records)):
+            continue  # however well it is explained
+        losses = {
+            output: _find_lost(files, survey, [records[number] for number in without.agreeing], records[impact], output)
+            for output, without in withouts.items()
+        }
+        first = min(losses.values(), key=lambda loss: loss.share)
+        alike = [output for output, loss in losses.items() if _is_same_loss(loss, first)]
+        ratios = [
+            withouts[output].log_ratio(misfits[output], max(misfits[output] * losses[output].share, 1.0))
+            for output in alike
+        ]
+        if _is_witnessed(ratios, len(records)):
+            for output in alike:
+                found[output], lost[impact, output] = withouts[output], first
+    return found, lost
+
+
+def _is_witnessed(log_ratios: Sequence[float], n_tried: int) -> bool:
+    """Tell whether responses besides the one that tells most make what was tried so much likelier that it counts."""
+    return bool(sum(log_ratios) - max(log_ratios, default=0.0) > np.log(n_tried / LEVEL))
+
+
+def _is_same_loss(loss: LostSamples, first: LostSamples) -> bool:
+    """Tell whether as many samples are lost at the same place, before which nothing differs."""
+    is_same = loss.lost == first.lost and abs(loss.start - first.start) <= abs(loss.lost)
+    return bool(loss.lost) and is_same and loss.before <= DISAGREE**2
 
 
 def _without_lost_of_three(
@@ -320,7 +377,7 @@ def _without_lost_of_three(
     shares: list[tuple[float, int]] = []
     for impact in comparison.agreeing:
         others = [records[number] for number in comparison.agreeing if number != impact]
-        _, lost, share = _find_lost(files, survey, others, records[impact], output)
+        _, lost, share, _ = _find_lost(files, survey, others, records[impact], output)
         shares += [(share, impact)] if lost > 0 else []
     if not shares or min(shares)[0] > DISAGREE**2:
         return comparison
@@ -390,24 +447,28 @@ def _explain(
     spectra: ImpactSpectra,
     comparison: OutputComparison,
     place: tuple[int, int],
-    lost_samples: tuple[int, int, float],
+    lost_samples: LostSamples,
 ) -> str:
     """Say what fault makes one response of an impact contradict those of the others; empty where none does."""
     impact, output = place
     force, response, noise = spectra.force[impact], spectra.responses[impact, output], spectra.noise[impact, output]
     misfit = comparison.misfit(force, response, noise)
-    start, lost, share = lost_samples
+    lost, share = lost_samples.lost, lost_samples.share
     expected = comparison.frf * force
     weight = 1.0 / np.maximum(np.maximum(comparison.scatter, noise), np.finfo(float).tiny)
     factor = complex(np.sum(weight * expected.conj() * response) / np.sum(weight * np.abs(expected) ** 2))
     scaled = comparison.misfit(force, response / factor, noise) if factor else misfit
     is_lost = lost and (share <= DISAGREE**2 or comparison.explains(misfit, max(misfit * share, 1.0), 1))
     if is_lost and not scaled < misfit * share:
-        what = f"{abs(lost)} samples {'are lost' if lost > 0 else 'came in'}"
-        return f"{what} {start * survey.step_s:.4g} s after its beginning"
+        return _say_lost(survey, lost_samples)
     if comparison.explains(misfit, scaled, 1):
         return f"it is {abs(factor):.3g} times as large"
     return ""
+
+
+def _say_lost(survey: Survey, loss: LostSamples) -> str:
+    what = f"{abs(loss.lost)} samples {'are lost' if loss.lost > 0 else 'came in'}"
+    return f"{what} {loss.start * survey.step_s:.4g} s after its beginning"
 
 
 def _difference(spectra: ImpactSpectra, comparison: OutputComparison, place: tuple[int, int]) -> str:
@@ -425,7 +486,7 @@ def _difference(spectra: ImpactSpectra, comparison: OutputComparison, place: tup
 
 def _find_lost(
     files: RecordingFiles, survey: Survey, agreeing: Sequence[RecordInfo], record: RecordInfo, output: int
-) -> tuple[int, int, float]:
+) -> LostSamples:
     """Compare an impact's response with what the FRF of the others makes of its force."""
     power, cross = np.zeros(survey.n_samples // 2 + 1), np.zeros(survey.n_samples // 2 + 1, complex)
     for _, signals in _windowed(files, survey, agreeing):
@@ -482,9 +543,9 @@ def _lost_of_pair(
     found: list[tuple[float, int, int, int]] = []
     for impact in (0, 1):
         losses = [_find_lost(files, survey, [records[1 - impact]], records[impact], output) for output in outputs]
-        if losses and len({lost for _, lost, _ in losses}) == 1 and losses[0][1] > 0:
-            start, lost, _ = losses[0]
-            found.append((max(share for _, _, share in losses), impact, lost, start))
+        if losses and len({loss.lost for loss in losses}) == 1 and losses[0].lost > 0:
+            start, lost, *_ = losses[0]
+            found.append((max(loss.share for loss in losses), impact, lost, start))
     if not found or min(found)[0] > DISAGREE**2:
         return None
     _, impact, lost, start = min(found)

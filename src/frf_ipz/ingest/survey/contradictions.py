@@ -149,9 +149,23 @@ class OutputComparison:
         bool
             True where the ratio of the densities exceeds their number over the level, and the explanation fits.
         """
+        return self.log_ratio(misfit, explained) > np.log(n_tried / LEVEL) and self.probability(explained) > LEVEL
+
+    def log_ratio(self, misfit: float, explained: float) -> float:
+        """Compare the densities of a misfit with and without an explanation.
+
+        Parameters
+        ----------
+        misfit, explained : float
+            D without and with it.
+
+        Returns
+        -------
+        float
+            Natural logarithm of the ratio.
+        """
         degrees = len(self.agreeing) - 1
-        log_ratio = (degrees + 1) * (np.log1p(misfit / degrees) - np.log1p(explained / degrees))
-        return bool(log_ratio > np.log(n_tried / LEVEL)) and self.probability(explained) > LEVEL
+        return float((degrees + 1) * (np.log1p(misfit / degrees) - np.log1p(explained / degrees)))
 
 
 def compare_output(spectra: ImpactSpectra, output: int) -> OutputComparison | None:

@@ -14,7 +14,6 @@ from frf_ipz.ingest.estimation.frf_files import read_frf_levels
 from frf_ipz.input_files import entering
 from frf_ipz.late_imports import import_late
 from frf_ipz.output_files import write_text
-from frf_ipz.pipeline.stages.hints import naming_the_model
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.diagnose import find_causes
     from frf_ipz.diagnosis.measured.levels import compare_frf_levels, compare_levels
     from frf_ipz.diagnosis.observations import observe_from
+    from frf_ipz.pipeline.stages.hints import naming_the_model
 else:
     correct_frfs = import_late("frf_ipz.diagnosis.apply", "correct_frfs")
     correct_model = import_late("frf_ipz.diagnosis.apply", "correct_model")
@@ -39,6 +39,7 @@ else:
     compare_frf_levels = import_late("frf_ipz.diagnosis.measured.levels", "compare_frf_levels")
     compare_levels = import_late("frf_ipz.diagnosis.measured.levels", "compare_levels")
     observe_from = import_late("frf_ipz.diagnosis.observations", "observe_from")
+    naming_the_model = import_late("frf_ipz.pipeline.stages.hints", "naming_the_model")
 
 STAGES = ("diagnose", "levels")
 RUN_SECONDS = 60.0  # wall time of a search in a run, where the user states none
