@@ -146,7 +146,7 @@ def deviation_lines(results: Results) -> list[tuple[str, str]]:
 
 
 def assessment_lines(assessment: Assessment) -> list[tuple[str, str]]:
-    """Sum up the assessment: the verdict, what most likely has to be corrected, and the checks that cost it.
+    """Sum up the assessment: the verdict, what most likely has to be corrected, and the checks that say what to do.
 
     Parameters
     ----------
@@ -168,7 +168,8 @@ def assessment_lines(assessment: Assessment) -> list[tuple[str, str]]:
         lines.append(("because" if check is costly[0] else "", check.says + advice))
     if len(costly) > MOST_CHECKS:
         lines.append(("", f"and {len(costly) - MOST_CHECKS} more, on the page and in run.json"))
-    return lines
+    free = [check for check in assessment.checks if check not in costly and check.is_answered and check.advice]
+    return [*lines, *(("look at", f"{check.says}: {check.advice}") for check in free)]
 
 
 def estimate_lines(estimate: FrfEstimate, *, coherence: str = "") -> list[tuple[str, str]]:

@@ -14,6 +14,7 @@ from frf_ipz.assessment.assess import assess
 from frf_ipz.assessment.checks import agreement, counterparts, prediction, quality
 from frf_ipz.assessment.evidence import Evidence
 from frf_ipz.pairing.pairs import PairVerdict
+from frf_ipz.runs.summary import assessment_lines
 
 OUTPUTS, INPUTS, POINT = ("9:+z", "16:+z", "21:+z"), ("12:+z",), "18:+z"
 LINES = np.arange(5.0, 700.0, 0.5)
@@ -118,6 +119,22 @@ def test_an_update_that_made_it_worse_is_seen(evidence):
     check = the(agreement.improvement, replace(evidence, updated_model=worse))
     assert check.verdict is WITH_CARE
     assert check.figure > check.limit
+
+
+def test_an_frf_that_the_update_made_worse_beyond_its_band_is_said_though_all_together_are_better(evidence):
+    """One of three FRFs is what the nominal model says, the others are what the updated one says."""
+    values = evidence.frfs.values.copy()
+    nominal = evidence.updated_model.compute_frfs(evidence.frfs.labels, evidence.frfs.s, nominal=True)
+    values[:, 1] = nominal[:, 1]
+    changed = replace(evidence, frfs=replace(evidence.frfs, values=values))
+    check = the(agreement.improvement, changed)
+    assert check.verdict is USABLE
+    assert f"{evidence.frfs.labels[1]} is worse after updating than before (" in check.says
+    assert "of its lines: the update has shifted it" in check.says
+    assert ("look at", f"{check.says}: {check.advice}") in assessment_lines(frf_ipz.Assessment.of_checks([check]))
+    sound = the(agreement.improvement, evidence)
+    assert "worse after" not in sound.says
+    assert not sound.advice
 
 
 @pytest.mark.parametrize(("factor", "verdict"), [(1.0, USABLE), (3.0, WITH_CARE), (1 / 3, WITH_CARE)])

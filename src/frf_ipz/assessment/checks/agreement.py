@@ -210,7 +210,7 @@ def improvement(evidence: Evidence) -> Iterator[Check]:
     if point is not None and _is_worse(point.nominal_db, point.updated_db, noise):
         before, after, where = point.nominal_db, point.updated_db, point.frf
         says += f"; at the point of interest, {point.where}, by {point.figures}"
-    is_worse = _is_worse(before, after, noise)
+    is_worse, worsened = _is_worse(before, after, noise), _say_worsened(evidence)
     yield Check(
         name=TOGETHER,
         verdict=Verdict.WITH_CARE if is_worse else Verdict.USABLE,
@@ -218,14 +218,46 @@ def improvement(evidence: Evidence) -> Iterator[Check]:
         limit=before,
         unit="dB",
         where=where,
-        says=says + (": updating has made it worse" if is_worse else ""),
-        advice="look at the pairs, and for what the model leaves out: frf-ipz diagnose" if is_worse else "",
+        says=says + worsened + (": updating has made it worse" if is_worse else ""),
+        advice="look at the pairs, and for what the model leaves out: frf-ipz diagnose" if is_worse or worsened else "",
     )
 
 
 def _is_worse(before: float, after: float, noise: float) -> bool:
     """Tell whether a deviation has grown beyond noise, to one that a controller feels; all in dB."""
     return after > before + noise and after > SIXTH * GAIN_MARGIN_DB
+
+
+def _say_worsened(evidence: Evidence) -> str:
+    """Say which measured FRFs are farther off than before, by more than noise and than their own band allows."""
+    inside = _is_inside(evidence)
+    if inside is None:
+        return ""
+    texts, labels = [], evidence.frfs.labels
+    for column in np.flatnonzero(evidence.is_heard.any(axis=0)).tolist():
+        heard = evidence.is_heard[:, column]
+        before, after = (
+            float(np.nanmedian(evidence.decibels(values)[:, column])) for values in (evidence.nominal, evidence.updated)
+        )
+        noise = float(np.median(20 * np.log10(1 + (evidence.noise / np.abs(evidence.measured))[heard, column])))
+        share = float(np.mean(inside[heard, column]))
+        if after > before + noise and share < INSIDE:
+            texts.append(
+                f"{labels[column]} is worse after updating than before ({after:.2g} and {before:.2g} dB), and its own "
+                f"90 % band holds {100 * share:.0f} % of its lines: the update has shifted it to meet others, and points "
+                "near it may be off by more than their bands"
+            )
+    return "".join(f"; {text}" for text in texts)
+
+
+def _is_inside(evidence: Evidence) -> BoolArray | None:
+    """(n_lines, n_frfs) whether the band of the updated model holds a measured value; None where there is no band."""
+    low, high = evidence.band
+    if not np.isfinite(low).any():
+        return None
+    reach = NORMAL_90 * evidence.noise / np.sqrt(2)  # half of the variance lies along the value
+    magnitude = np.abs(evidence.measured)
+    return np.asarray((magnitude >= low - reach) & (magnitude <= high + reach))
 
 
 def own_band(evidence: Evidence) -> Iterator[Check]:
@@ -241,12 +273,9 @@ def own_band(evidence: Evidence) -> Iterator[Check]:
     Check
         One, where the method of updating gives a band.
     """
-    low, high = evidence.band
-    if not np.isfinite(low).any():
+    inside = _is_inside(evidence)
+    if inside is None:
         return
-    reach = NORMAL_90 * evidence.noise / np.sqrt(2)  # half of the variance lies along the value
-    magnitude = np.abs(evidence.measured)
-    inside = (magnitude >= low - reach) & (magnitude <= high + reach)
     share = float(np.mean(inside[evidence.is_heard])) if evidence.is_heard.any() else float("nan")
     if not np.isfinite(share):
         return
