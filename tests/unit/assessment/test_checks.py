@@ -130,7 +130,7 @@ def test_an_frf_that_the_update_made_worse_beyond_its_band_is_said_though_all_to
     check = the(agreement.improvement, changed)
     assert check.verdict is USABLE
     assert f"{evidence.frfs.labels[1]} is worse after updating than before (" in check.says
-    assert "of its lines: the update has shifted it" in check.says
+    assert "of its lines: the update has moved it" in check.says
     assert ("look at", f"{check.says}: {check.advice}") in assessment_lines(frf_ipz.Assessment.of_checks([check]))
     sound = the(agreement.improvement, evidence)
     assert "worse after" not in sound.says

@@ -244,7 +244,7 @@ def _say_worsened(evidence: Evidence) -> str:
         if after > before + noise and share < INSIDE:
             texts.append(
                 f"{labels[column]} is worse after updating than before ({after:.2g} and {before:.2g} dB), and its own "
-                f"90 % band holds {100 * share:.0f} % of its lines: the update has shifted it to meet others, and points "
+                f"90 % band holds {100 * share:.0f} % of its lines: the update has moved it to meet others, and points "
                 "near it may be off by more than their bands"
             )
     return "".join(f"; {text}" for text in texts)
