@@ -12,7 +12,9 @@ from frf_ipz.frf import FrfLabel
 from frf_ipz.rational import ZeroSet
 from frf_ipz.visible_text import counted
 
-ONE_SIDED = 0.5  # of the half width: a band that reaches less far to one side is given by both sides
+# A band that reaches farther to one side than its half width, by more than two deviations of what 200 members tell of
+# the quantile q = 0.05 of a normal distribution, sqrt(q (1 - q) / 200) / (density 0.103 times 1.645), has two sides.
+TOLD = 0.18
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -101,8 +103,8 @@ class Prediction(Tabulated, Drawn):
         Returns
         -------
         str
-            ``+-0.28 dB``, or ``-0.03 to +0.53 dB`` where it lies on one side of the prediction, as where the mass of
-            the model is in doubt.
+            ``+-0.28 dB``, or ``-0.23 to +0.12 dB`` where it reaches farther to one side, as where the mass of the model
+            is in doubt.
         """
         half = float(self.half_width_db[frf])
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -110,7 +112,7 @@ class Prediction(Tabulated, Drawn):
             edges = np.array([self.magnitude_low[:, frf] / size, self.magnitude_high[:, frf] / size])
         known = np.isfinite(edges).all(axis=0) & (edges > 0).all(axis=0)
         low, high = 20 * np.log10(np.median(edges[:, known], axis=1)) if known.any() else (-half, half)
-        if min(-low, high) >= ONE_SIDED * half:
+        if max(-low, high) <= (1.0 + TOLD) * half:
             return f"+-{half:.2g} dB"
         return f"{low:+.2g} to {high:+.2g} dB"
 

@@ -218,9 +218,15 @@ def test_roots_of_an_ensemble_are_found_once_for_all_its_bands(monkeypatch):
 
 @pytest.mark.parametrize(
     ("low_db", "high_db", "expected"),
-    [(-0.5, 0.5, "+-0.5 dB"), (-0.03, 0.53, "-0.03 to +0.53 dB"), (-0.36, 0.07, "-0.36 to +0.07 dB")],
+    [
+        (-0.5, 0.5, "+-0.5 dB"),
+        (-0.26, 0.2, "+-0.23 dB"),  # as quantiles of 200 members do
+        (-0.23, 0.12, "-0.23 to +0.12 dB"),
+        (-0.03, 0.53, "-0.03 to +0.53 dB"),
+        (-0.36, 0.07, "-0.36 to +0.07 dB"),
+    ],
 )
-def test_a_band_on_one_side_is_given_by_both_sides(low_db, high_db, expected):
+def test_a_band_that_reaches_farther_to_one_side_is_given_by_both_sides(low_db, high_db, expected):
     values = np.exp(1j * np.linspace(0.0, 2.0, 50))[:, None]
     prediction = Prediction(
         frequency_hz=np.linspace(10.0, 100.0, 50),
