@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from frf_ipz.errors import NoModesError
 from frf_ipz.identification.fit import fit_modes
 from frf_ipz.identification.likelihood.delay import find_delays
 from frf_ipz.identification.likelihood.smooth_terms import smooth_terms_of_band
@@ -127,3 +128,22 @@ def test_the_best_delay_is_found_between_those_of_a_coarse_grid(frequency_hz):
         terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(3)
         found_s, _ = find_delays(data, truth.poles, terms, np.arange(4))
         np.testing.assert_allclose(found_s, late_s, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", [1, 8])
+def test_no_delay_makes_modes_where_there_are_none(seed):
+    """No poles at all were found on the smooth lines, so that any delay with poles of its own described them better."""
+    lines_hz = np.arange(20.0, 400.25, 0.5)
+    modes = random_modes([58.0, 201.0, 330.0], 0.01, n_outputs=2, n_inputs=1, seed=seed)
+    frfs = accelerances(modes, lines_hz, noise=1e-4, seed=seed + 5)
+    with pytest.raises(NoModesError):
+        fit_modes(frfs, options=FitOptions(band_hz=(20.0, 400.0), exclude_hz=((20.0, 110.0), (130.0, 400.0))))
+
+
+def test_no_more_poles_are_tried_than_few_lines_can_tell():
+    """What a delay of 39 smooth lines leaves proposed so many that there were more unknowns than numbers."""
+    modes = random_modes([58.0, 201.0, 330.0], 0.01, n_outputs=2, n_inputs=1, seed=10)
+    frfs = accelerances(modes, np.arange(20.0, 400.25, 0.5), noise=1e-4, seed=15)
+    early = replace(frfs, values=frfs.values * np.exp(-frfs.s[:, None] * 12 / 13))
+    fit = fit_modes(early, options=FitOptions(band_hz=(110.5, 129.5), delay=False))
+    assert fit.n_modes < 19

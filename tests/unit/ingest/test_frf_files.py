@@ -351,6 +351,15 @@ def test_a_phase_without_a_magnitude_is_refused_as_such(tmp_path):
     assert "it has 'Phase [deg]' alone beside 'Frequency [Hz]': an FRF needs real and imaginary part" in text
 
 
+@pytest.mark.parametrize("header", ["Real [m/s²/N]\tImag [m/s²/N]", "Real\tImag\tCoherence"])
+def test_a_table_without_frequencies_is_refused_as_such(tmp_path, header):
+    further = "\t1.0" if "Coherence" in header else ""
+    rows = [f"{value.real}\t{value.imag}{further}" for value in VALUES[:, 0]]
+    (tmp_path / "frf.txt").write_text("\n".join([header, *rows]), encoding="utf-8")
+    text = message(tmp_path, entry("frf.txt") + '\noutput_dof = "1:+z"\ninput_dof = "3:+z"')
+    assert "it has no column of frequencies beside 'Real" in text
+
+
 def test_files_without_common_lines(tmp_path):
     long_csv(tmp_path, outputs=("1:+z",))
     long_csv(tmp_path, name="b.csv", outputs=("2:+z",), lines_hz=LINES_HZ * 1.37)

@@ -220,13 +220,16 @@ def _fit_late_responses(
 
 
 def _first_delay(frfs: FrfSet, lines: MeasuredLines, first_s: float, options: FitOptions) -> tuple[float, float]:
-    """Find a delay near a first one by normal modes that are roughly right, and their misfit."""
+    """Find a delay near a first one by normal modes that are roughly right, and their misfit.
+
+    Where there is no mode, terms that are smooth over the lines may describe them all.
+    """
     advanced = lines.advanced(np.full(frfs.n_frfs, first_s))
     start = find_start_poles(frfs, advanced, max_order=options.max_order)
-    if not len(start.poles):
-        return first_s, float("inf")
     terms = smooth_terms_of_band(lines.band_hz, lines.line_hz).first(FIXED_POLES)
     data = advanced.weighted(shared=True)
+    if not len(start.poles):
+        return first_s, float(np.sum(compress(data, start.poles, terms).misfit))
     fit = refine_poles(data, start.poles, terms, iterations=ROUGH_ITERATIONS)
     delays_s, misfit = find_delays(data.with_real_modes(), fit.poles, terms, np.zeros(frfs.n_frfs, np.int64))
     return first_s + float(delays_s[0]), misfit

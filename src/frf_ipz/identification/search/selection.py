@@ -181,7 +181,7 @@ def _add_and_drop(search: _Search, start: RefinedPoles) -> tuple[RefinedPoles, G
     in_vain = np.zeros(0, complex)  # proposed beside the same fit before
     for number in range(ROUNDS):
         fit, goodness = _without_drift(search, fit, goodness, is_start=number == 0)
-        proposed = _proposed_poles(search, goodness)
+        proposed = _proposed_poles(search, goodness)[: _room(search, fit)]
         if not len(proposed) or np.array_equal(proposed, in_vain):
             break
         trial = refine_poles(
@@ -407,6 +407,12 @@ def _proposed_poles(search: _Search, goodness: GoodnessOfFit) -> ComplexArray:
             proposed.append(complex(pole))
     poles = np.array(proposed, complex)
     return poles[~_is_rejected(search, poles)]
+
+
+def _room(search: _Search, fit: RefinedPoles) -> int:
+    """Count the poles for which the lines have as many numbers as they have unknowns, besides those of a fit."""
+    each = (1 if search.data.real_modes else 2) + 2  # a residue and a pole
+    return max(0, (2 * len(search.data.s) - search.terms.n_columns) // each - len(fit.poles))
 
 
 def _added_poles(before: ComplexArray, after: ComplexArray) -> tuple[ComplexArray, str, list[str]]:

@@ -12,6 +12,7 @@ import numpy as np
 from frf_ipz.dofs import as_dofs
 from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.ingest import formats
+from frf_ipz.ingest.formats.column_words import FREQUENCY, frf_role
 from frf_ipz.ingest.formats.file_arrays import ArrayFormat
 from frf_ipz.ingest.formats.frf_file import FrfFormat
 from frf_ipz.ingest.formats.modes_file import ModesFormat
@@ -100,6 +101,10 @@ def _columns_unknown(path: Path) -> str:
     except FileFormatError:
         return ""
     names = next((row for row in reversed(layout.header) if len(row) == layout.n_columns), ())
+    roles = [frf_role(name) for name in names]
+    if names and all(roles) and FREQUENCY not in roles:
+        shown = ", ".join(f"'{name[:LETTERS_SHOWN]}'" for name in names[:NAMES_SHOWN])
+        return f"; it has no column of frequencies beside {shown}: export them too"
     if names and layout.n_columns == FEWEST_COLUMNS - 1:
         return f"; it has '{names[-1][:LETTERS_SHOWN]}' alone beside '{names[0][:LETTERS_SHOWN]}': {TWO_PARTS}"
     if not names or layout.n_columns < FEWEST_COLUMNS:
