@@ -1,8 +1,13 @@
 """Count how stable the modes of a test are: fit it again and again, each time changed a little.
 
 ``python pipelines/stability.py TEST_TOML [LOW_HZ HIGH_HZ]``: band edges moved by 2 %, 1 % noise, a half or a third
-of the lines, FRFs or impacts left out, other estimators. Of each change it prints how many modes there are, which share
-of those with `found_again` over 0.9 is found again, and how far frequency and damping moved over their deviations.
+of the lines, FRFs or impacts left out, other estimators. Of each it prints how many modes there are, which share of
+those with `found_again` over 0.9 is found again, and how far frequency and damping moved over their deviations.
+
+Two fits to nearly the same data hardly differ, however uncertain both are; a third of the data differs from all of it
+by more than a deviation of the latter. So what was to be expected stands beside it: estimates from overlapping data
+differ by a variance of 1/A + 1/B - 2 C/(A B), if A and B is what each knows of a pole (Fisher's information) and C what
+they know in common; where a share p is left of A, that is (1/p - 1)/A (Hausman 1978, doi:10.2307/1913827).
 """
 
 import sys
@@ -15,44 +20,78 @@ from scipy.optimize import linear_sum_assignment
 import frf_ipz
 
 Band = tuple[float, float]
+Lost = tuple[np.ndarray, np.ndarray | float]
 SURE, SAME = 0.9, 0.5  # found_again; half widths within which two poles are one mode
 EDGE, NOISE, SEEDS, MOST_LEFT_OUT = 0.02, 0.01, 5, 5
 EDGES = [(low, high) for low in (0, 1, -1) for high in (0, 1, -1) if low or high]  # in units of EDGE
 
 
-def perturbed(path: str, frfs: frf_ipz.FrfSet, band: Band) -> Iterator[tuple[str, frf_ipz.FrfSet, Band]]:
-    """Give name, FRFs and band of each perturbation."""
+def perturbed(path: str, frfs: frf_ipz.FrfSet, band: Band) -> Iterator[tuple[str, frf_ipz.FrfSet, Band, Lost]]:
+    """Give name, FRFs and band of each perturbation, the share of each value that is left, and the noise on it."""
+    lines, every, whole = np.arange(frfs.n_lines), np.arange(frfs.n_frfs), (np.ones((1, 1)), 0.0)
     for low, high in EDGES:
-        yield f"edges {low:+d} {high:+d}", frfs, (band[0] * (1 + low * EDGE), band[1] * (1 + high * EDGE))
+        yield f"edges {low:+d} {high:+d}", frfs, (band[0] * (1 + low * EDGE), band[1] * (1 + high * EDGE)), whole
     for seed in range(SEEDS):
         size = NOISE * np.abs(frfs.values) / np.sqrt(2)
         real, imag = np.random.default_rng(seed).standard_normal((2, *size.shape)) * size
         noisy = replace(frfs, values=frfs.values + real + 1j * imag, variance=frfs.variance + 2 * size**2)
-        yield f"1 % noise, {seed}", noisy, band
+        yield f"1 % noise, {seed}", noisy, band, (np.ones((1, 1)), 2 * size**2)
     for step, first in ((2, 0), (2, 1), (3, 0), (3, 1), (3, 2)):
-        yield f"line {first} of {step}", frfs.select_lines(np.arange(frfs.n_lines) % step == first), band
+        kept = lines % step == first
+        yield f"line {first} of {step}", frfs.select_lines(kept), band, (kept[:, None], 0.0)
     for left_out in range(min(frfs.n_frfs, MOST_LEFT_OUT) if frfs.n_frfs > 1 else 0):
-        yield f"without FRF {left_out}", frfs.select_frfs(np.delete(np.arange(frfs.n_frfs), left_out)), band
+        yield (
+            f"without FRF {left_out}",
+            frfs.select_frfs(np.delete(every, left_out)),
+            band,
+            (every[None] != left_out, 0.0),
+        )
     test = frf_ipz.read_test(path)
     if test.kind != "frf":
         records = frf_ipz.estimate_frfs(test).records["record"].tolist()
-        options = {name: frf_ipz.IngestOptions(estimator=name) for name in ("H2", "Hv")}
-        options |= {f"without {one}": frf_ipz.IngestOptions(drop=(one,)) for one in records if len(records) > 1}
-        for name, chosen in options.items():
-            yield name, frf_ipz.estimate_frfs(test, options=chosen).frfs, band
+        options = {name: (frf_ipz.IngestOptions(estimator=name), whole) for name in ("H2", "Hv")}
+        fewer = np.full((1, 1), 1 - 1 / len(records)), 0.0
+        for one in records if len(records) > 1 else ():
+            options[f"without {one}"] = frf_ipz.IngestOptions(drop=(one,)), fewer
+        for name, (chosen, lost) in options.items():
+            yield name, frf_ipz.estimate_frfs(test, options=chosen).frfs, band, lost
 
 
-def compare(base: frf_ipz.ModalFit, fit: frf_ipz.ModalFit) -> tuple[np.ndarray, np.ndarray]:
-    """Give which sure modes of the first fit the second has, and the changes of their poles over their deviations."""
+def expected(base: frf_ipz.ModalFit, frfs: frf_ipz.FrfSet, band: Band, lost: Lost) -> np.ndarray:
+    """Give the variance of the change of each pole over its own, which overlapping data leave.
+
+    Errors of values are as they were measured, or else the same part of each, and as large as the deviations say.
+    """
+    errors = np.where(np.isfinite(frfs.variance), frfs.variance, np.abs(frfs.values) ** 2)
+    before, after = (frfs.in_band(edges)[:, None] for edges in (base.band_hz, band))
+    kept, noise = lost
+    ratios = []
+    for k, (pole, residues) in enumerate(zip(base.model.poles[: base.n_modes], base.model.residues, strict=False)):
+        slopes = np.abs(residues / (frfs.s[:, None] - pole) ** 2) ** 2
+        told = np.mean(np.diag(base.covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2]))
+        size = told * (before * slopes / errors).sum()
+        alone, other = before * slopes / (size * errors), after * kept * slopes / (size * errors + noise)
+        ratios.append(1 + alone.sum() / other.sum() - 2 * np.minimum(alone, other).sum() / other.sum())
+    return np.array(ratios)
+
+
+def compare(base: frf_ipz.ModalFit, fit: frf_ipz.ModalFit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Give which sure modes of the first fit the second has, the changes of their poles over deviations, and which."""
     poles, others = (one.model.poles[: one.n_modes] for one in (base, fit))
     distance = np.abs(poles[:, None] - others) / np.minimum(-poles.real[:, None], -others.real)
     rows, columns = linear_sum_assignment(np.minimum(distance, 1))
-    same = distance[rows, columns] < SAME
-    rows, change = rows[same], (others[columns] - poles[rows])[same]
-    deviation = np.array([np.sqrt(np.diag(base.covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2])) for k in rows])
     is_sure = base.modes["found_again"].to_numpy() > SURE
-    changes = np.stack([change.real, change.imag], axis=1) / deviation.reshape(-1, 2)
-    return np.isin(np.flatnonzero(is_sure), rows), changes[is_sure[rows]].ravel()
+    same = distance[rows, columns] < SAME
+    found, rows, columns = np.isin(np.flatnonzero(is_sure), rows[same]), rows[same], columns[same]
+    rows, columns = rows[is_sure[rows]], columns[is_sure[rows]]
+    deviation = np.array([np.sqrt(np.diag(base.covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2])) for k in rows])
+    change = others[columns] - poles[rows]
+    return found, np.stack([change.real, change.imag], axis=1) / deviation.reshape(-1, 2), rows
+
+
+def rms(values: np.ndarray) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def main(path: str, band: Band | None = None) -> None:
@@ -61,16 +100,19 @@ def main(path: str, band: Band | None = None) -> None:
     base = frf_ipz.fit_modes(frfs, options=frf_ipz.FitOptions(band_hz=band))
     print(f"{'as it is':20s}{base.n_modes:4d} modes, {(base.modes['found_again'] > SURE).sum()} sure", flush=True)
     rows = []
-    for name, other, edges in perturbed(path, frfs, base.band_hz):
+    for name, other, edges, lost in perturbed(path, frfs, base.band_hz):
         fit = frf_ipz.fit_modes(other, options=frf_ipz.FitOptions(band_hz=edges))
-        rows.append((*compare(base, fit), fit.n_modes))
-        again, size = np.mean(rows[-1][0]), np.sqrt(np.mean(rows[-1][1] ** 2))
-        print(f"{name:20s}{fit.n_modes:4d} modes, {again:5.0%} again, {size:5.2f} deviations (rms)", flush=True)
-    again, changes = (np.concatenate([row[part] for row in rows]) for part in range(2))
-    typical = np.median([row[2] for row in rows])
+        found, changes, modes = compare(base, fit)
+        due = np.sqrt(expected(base, frfs, edges, lost))[modes, None].repeat(2, axis=1)
+        rows.append((found, changes.ravel(), due.ravel(), [fit.n_modes]))
+        size = f"{rms(changes):5.2f} deviations (rms), {rms(due):.2f} to be expected"
+        print(f"{name:24s}{fit.n_modes:4d} modes, {np.mean(found):5.0%} again, {size}", flush=True)
+    again, changes, due, counts = (np.concatenate(column) for column in zip(*rows, strict=True))
     print(
-        f"{len(rows)} perturbations: {np.mean(again):.1%} found again, changes of {np.sqrt(np.mean(changes**2)):.2f} "
-        f"deviations (rms), {np.mean(np.abs(changes) > 3):.1%} beyond three; {typical:g} modes"
+        f"{len(rows)} perturbations: {np.mean(again):.1%} found again; changes of {rms(changes):.2f} deviations (rms), "
+        f"{rms(changes) / rms(due):.2f} of what was to be expected; {np.mean(np.abs(changes) > 3):.1%} beyond three "
+        f"deviations, {np.mean(np.abs(changes) > 3 * np.maximum(due, 1)):.1%} with those of smaller samples; "
+        f"{np.median(counts):g} modes"
     )
 
 

@@ -98,7 +98,7 @@ def with_expanded_shapes(
     _, is_inner = inner_points(side_with_more(fit), side_with_more(fit), problem.model.expanded_dofs, geometry)
     between = tuple(point for point, lies_inside in zip(side_with_more(fit), is_inner, strict=True) if lies_inside)
     causes = _find_causes(fit, problem.model, measured, tuple(dict.fromkeys(((), places))), between)
-    loaded, measured, wrong_gains, left_out = min(causes, key=lambda cause: cause.error_db)
+    loaded, measured, wrong_gains, left_out = _least_cause(causes)
     if left_out is None or not _is_nearer(left_out, dict(zip(side_with_more(fit), without, strict=True))):
         return updated
     modes = expand_modes(loaded.model, measured, error=loaded.error, scatter=loaded.scatter, is_scale_known=is_known)
@@ -186,10 +186,19 @@ class _Cause(NamedTuple):
     wrong_gains: dict[AnyDof, WrongGain]
     left_out: LeftOutPoints | None
 
-    @property
-    def error_db(self) -> float:
-        """How well left-out points follow from the others."""
-        return np.inf if self.left_out is None else float(np.median(self.left_out.error_db))
+
+def _least_cause(causes: list[_Cause]) -> _Cause:
+    """Take masses only where left-out points follow better with them, by more than chance.
+
+    Masses fit errors of gain and place as well, and then bend the shapes between the points.
+    """
+    least = causes[0]
+    for cause in causes[1:]:
+        if least.left_out is None or (
+            cause.left_out is not None and _is_nearer(cause.left_out, least.left_out.errors_db)
+        ):
+            least = cause
+    return least
 
 
 def _find_causes(

@@ -117,6 +117,11 @@ class LeftOutPoints:
     is_told: BoolArray
     reciprocal: tuple[ShapeErrors, ...]
 
+    @property
+    def errors_db(self) -> dict[AnyDof, float]:
+        """Error of each point, dB."""
+        return dict(zip(self.points, self.error_db.tolist(), strict=True))
+
 
 def leave_points_out(
     fit: ModalFit,
@@ -281,13 +286,17 @@ def _judge(
     partners = np.stack(at_partners, axis=1)
     shape = np.sum(amplitudes * partners, axis=1) / np.maximum(np.sum(partners**2, axis=1), np.finfo(float).tiny)
     large = np.abs(at_point) >= np.median(np.abs(at_point))
+    # as the expansion has it: an error of place counts by the slope, so that it is as large where a mode hardly moves
+    at_others = np.stack([shape.at_outputs if is_output else shape.at_inputs for shape in modes.shapes])
+    typical = np.mean(np.column_stack([at_others, shape]) ** 2, axis=1)
+    doubt = wrong_gains[point].std ** 2 if point in wrong_gains else 0.0
     return _Judgement(
         error_db=median_error_db(measured[:, frfs], np.stack(predicted, axis=1), is_level_known=is_known),
         log_ratio=float(np.median(np.log(np.abs(shape[large] / at_point[large])))),
         errors=ShapeErrors(
             difference=shape - at_point,
             variance=variance,
-            own_variance=(error**2 + (wrong_gains[point].std ** 2 if point in wrong_gains else 0.0)) * at_point**2,
+            own_variance=error**2 * typical + doubt * at_point**2,
         ),
     )
 

@@ -13,7 +13,7 @@ from frf_ipz.updating.shape_expansion import expand
 from frf_ipz.updating.shape_expansion.attached_masses import attachment_places, find_attached_masses
 from frf_ipz.updating.shape_expansion.expand import with_expanded_shapes
 from frf_ipz.updating.shape_expansion.expanded_model import build_expanded_model, expand_modes
-from frf_ipz.updating.shape_expansion.left_out_points import ShapeErrors, calibrate, leave_points_out
+from frf_ipz.updating.shape_expansion.left_out_points import LeftOutPoints, ShapeErrors, calibrate, leave_points_out
 from frf_ipz.updating.shape_expansion.measured_shapes import measured_shapes
 from frf_ipz.updating.shape_expansion.random_forces import ModalModel, field_at_points
 from frf_testbench.updating.synthetic_fit import TrueModes, simulate_fit
@@ -281,6 +281,35 @@ def test_stated_deviations_are_calibrated_beside_the_errors_of_what_was_left_out
         for row, std in zip(difference, stated, strict=True)
     ]
     assert calibrate(errors) == pytest.approx(factor, rel=0.15)
+
+
+def test_a_point_at_rest_in_a_mode_is_off_by_its_place_as_others_are(left_out):
+    """Where a mode has a node its amplitude is small and its slope is not."""
+    holds = leave_points_out(*left_out[:2], error=0.03, scatter=0.03)
+    own_std = np.sqrt([errors.own_variance for errors in holds.errors])
+    assert own_std.min() > 0.3 * np.median(own_std)  # 0.07 where it is a part of that amplitude
+
+
+def test_masses_are_taken_only_where_points_follow_better_by_more_than_chance():
+    def cause(name, errors_db):
+        points = tuple(SENSORS[: len(errors_db)])
+        left_out = LeftOutPoints(
+            points=points,
+            error_db=np.array(errors_db),
+            log_ratio=np.zeros(len(points)),
+            errors=(),
+            is_told=np.zeros(len(points), bool),
+            reciprocal=(),
+        )
+        return expand._Cause(name, None, {}, left_out)
+
+    none = cause("none", [0.28, 0.12, 0.20, 0.09])
+    slightly, surely = cause("masses", [0.20, 0.15, 0.18, 0.10]), cause("masses", [0.12, 0.05, 0.08, 0.04])
+    untold = expand._Cause("masses", None, {}, None)
+    assert expand._least_cause([none, slightly]) is none
+    assert expand._least_cause([none, surely]) is surely
+    assert expand._least_cause([none, untold]) is none
+    assert expand._least_cause([none]) is none
 
 
 def test_stated_deviations_never_shrink():
