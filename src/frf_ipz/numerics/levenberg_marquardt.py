@@ -21,6 +21,8 @@ from scipy import linalg
 
 from frf_ipz.arrays import FloatArray
 
+PATIENCE = 3  # steps after which an iteration may be stopped early
+FURTHER_GAIN = 6.0  # times the last decrease: what further steps may gain together
 Point = TypeVar("Point")
 Equations = TypeVar("Equations", bound="NormalEquations")
 
@@ -166,6 +168,10 @@ class AcceptedStep(Generic[Point]):
     before: Point
     after: Point
     decrease: float
+
+    def can_reach(self, cost_limit: float, cost: float) -> bool:
+        """Tell whether further steps are likely to bring the cost, `cost` after this one, below a limit."""
+        return self.number <= PATIENCE or cost - FURTHER_GAIN * self.decrease <= cost_limit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from scipy import optimize
 
 from frf_ipz.numerics.levenberg_marquardt import (
+    AcceptedStep,
     LeastSquaresStatus,
     LevenbergMarquardt,
     NormalEquations,
@@ -300,3 +301,11 @@ def test_an_accepted_point_may_lose_parameters():
     assert_allclose(fit.point, 2.0)
     fit = minimise(problem, np.array([3.0, 5.0]), LevenbergMarquardt(steps=1), revise=lambda point: point[-1:] + 7.0)
     assert_allclose(fit.cost, problem.cost(fit.point))
+
+
+@pytest.mark.parametrize(
+    ("number", "decrease", "can_reach"), [(3, 1.0, True), (4, 1.0, False), (4, 15.0, True), (9, 14.0, False)]
+)
+def test_further_steps_may_gain_a_few_times_what_the_last_one_did(number, decrease, can_reach):
+    step = AcceptedStep(number=number, before=None, after=None, decrease=decrease)
+    assert step.can_reach(10.0, 100.0) == can_reach

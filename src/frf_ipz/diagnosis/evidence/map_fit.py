@@ -43,9 +43,7 @@ MAX_CORRECTION = 0.1  # of a squared frequency: more is no small correction
 MIN_RATIO_PART = 0.05  # of a stated damping ratio: scatter takes no more away
 MIN_INFLUENCE = 0.02  # squared norm of a whitened derivative per standard deviation: less changes nothing
 
-PATIENCE = 3  # steps after which a fit may be stopped early
 LARGE_STEP = 0.3  # of the longest step: parameters that move so much are still on their way
-FURTHER_GAIN = 6.0  # times the last gain: what further steps may gain together
 ROUNDING = 1e-9  # of a diagonal entry: what a sum of squares of many lines is exact to
 
 
@@ -113,8 +111,7 @@ def fit_map(
     def is_of_no_use(step: AcceptedStep[_Point]) -> bool:
         moved = np.abs(step.after.searched - step.before.searched)
         is_far = bool(np.any(moved > LARGE_STEP * _longest_step(hypothesis)))
-        expected = step.after.objective - FURTHER_GAIN * step.decrease
-        return step.number > PATIENCE and not is_far and expected > 2 * cost_limit
+        return not is_far and not step.can_reach(2 * cost_limit, step.after.objective)
 
     settings = replace(SETTINGS, steps=iterations, absolute_decrease=tolerance, negligible_increase=tolerance)
     optimum = minimise(problem, start, settings, stop=is_of_no_use)

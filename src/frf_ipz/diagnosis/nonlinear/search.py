@@ -326,7 +326,9 @@ def _free_force_explains(problem: LawFitProblem, location: int) -> bool:
 
 def _gain_of_other_forces(problem: LawFitProblem, fit: LawFit) -> float:
     """Drop of the cost by simple forces beside a law at its location."""
-    return gain_of_added_forces(problem.segments, problem.linear.nuisance_prior, fit.start(), simple_forces)
+    return gain_of_added_forces(
+        problem.segments, problem.linear.nuisance_prior, fit.start(), simple_forces, known=fit.simulation
+    )
 
 
 def _with_location(result: LawSearch, modal_model: ModalModel, located: SimpleLawsFit, part: float) -> LawSearch:
@@ -369,7 +371,7 @@ def _judge(
             modal_model=modal_model,
             statement=f"{DISAGREE}; no law explains it.",
         )
-    fits, drops = _rank(problem, fits, always_rescores=always_rescores)
+    fits, drops = _rank(problem, fits, gain_of_others, always_rescores=always_rescores)
     best = fits[0]
     scale = max(1.0, best.cost / best.n_rows)
     gains = log_evidence_gains(fits, drops / scale, len(modal_model.locations), scale)
@@ -393,11 +395,14 @@ def _judge(
     )
 
 
-def _rank(problem: LawFitProblem, fits: list[LawFit], *, always_rescores: bool) -> tuple[list[LawFit], FloatArray]:
+def _rank(
+    problem: LawFitProblem, fits: list[LawFit], gain_of_others: Callable[[LawFit], float], *, always_rescores: bool
+) -> tuple[list[LawFit], FloatArray]:
     """Order fits by their evidence, and give it: half the drop of the cost.
 
     Where that is little, the disagreement of records counts besides, which the model's errors do not hide. Fits that
-    explain equally well are rescored, see `rescore`.
+    explain equally well are rescored, see `rescore`, where one of them may explain all: which of several laws that do
+    not is the best needs no such care.
     """
     drops = np.array([0.5 * (problem.linear.cost - fit.cost) for fit in fits])
     if drops[0] < WEAK_EVIDENCE and not problem.segments.moving.any():
@@ -406,7 +411,10 @@ def _rank(problem: LawFitProblem, fits: list[LawFit], *, always_rescores: bool) 
     contenders = select_contenders(fits)
     if len(contenders) > 1 and (
         always_rescores
-        or any(_may_explain(problem, fit, drop / scale) for fit, drop in zip(contenders, drops, strict=False))
+        or any(
+            _may_explain(problem, fit, drop / scale, gain_of_others)
+            for fit, drop in zip(contenders, drops, strict=False)
+        )
     ):
         rescored, behind = rescore(problem, contenders)
         fits = rescored + fits[len(rescored) :]
@@ -415,10 +423,10 @@ def _rank(problem: LawFitProblem, fits: list[LawFit], *, always_rescores: bool) 
     return [fits[i] for i in order], drops[order]
 
 
-def _may_explain(problem: LawFitProblem, fit: LawFit, gain: float) -> bool:
-    """Tell whether nothing speaks against a law but, perhaps, its shape."""
+def _may_explain(problem: LawFitProblem, fit: LawFit, gain: float, gain_of_others: Callable[[LawFit], float]) -> bool:
+    """Tell whether nothing speaks against a law: its shape is wrong, if at all, with any variance of the data."""
     agreement = assess_agreement(problem.segments, problem.linear.nuisance_prior, fit)
-    return not _find_objection(problem, fit, agreement, gain, lambda _: 0.0)
+    return not _find_objection(problem, fit, agreement, gain, gain_of_others)
 
 
 def _find_objection(
@@ -453,9 +461,10 @@ def _explains_first_moments(problems: Iterable[LawFitProblem], fit: LawFit) -> b
 
 
 def _explains_nearly_all(problem: LawFitProblem, fit: LawFit) -> bool:
-    refits = problem.fit_output_error(fit, FRESH_STEPS), problem.fit_output_error_afresh(fit, FRESH_STEPS)
-    best = min(refits, key=lambda refit: refit.cost)
-    if best.cost > NEARLY_ALL * problem.linear.cost:
+    best, enough = problem.fit_output_error(fit, FRESH_STEPS), NEARLY_ALL * problem.linear.cost
+    if best.cost > enough or not is_explained(best):
+        best = min(best, problem.fit_output_error_afresh(fit, FRESH_STEPS), key=lambda refit: refit.cost)
+    if best.cost > enough:
         return False
     agreement = assess_agreement(problem.segments, problem.linear.nuisance_prior, best)
     gain = 0.5 * (problem.linear.cost - best.cost) / max(1.0, best.cost / best.n_rows)

@@ -49,6 +49,7 @@ N_EXACT, N_EXACT_FAR_OFF = 7, 2
 COST_SLACK = 400.0  # besides a multiple of the best cost: beyond, hypotheses are not fitted exactly
 N_EFFECTS_IN_VAIN = 2  # effects whose neighbourhoods are searched where no further component explains much
 VAIN_COST_RATIO = 0.6  # of the cost of the base: a fit that leaves more does not explain it
+MAX_COST_LEFT = 0.8  # the same: what leaves more is no basis to search from, unless that is little enough
 N_CONTINUED = 2  # fits that go on until they converge
 N_BESIDE_NUISANCE, N_EXACT_BESIDE_NUISANCE = 12, 3  # effects that stand out beside a fitted nuisance, and are fitted
 N_ROUGH_AROUND = 16  # locations further around that are fitted with inflated errors
@@ -116,7 +117,7 @@ def fit_null_model(problem: InferenceProblem) -> Fit:
     return problem.fit((), np.zeros(0))
 
 
-def search_component(problem: InferenceProblem, base: Fit) -> Ranking:
+def search_component(problem: InferenceProblem, base: Fit, *, good_cost: float = np.inf) -> Ranking:
     """Search for one more component.
 
     Parameters
@@ -125,6 +126,9 @@ def search_component(problem: InferenceProblem, base: Fit) -> Ranking:
         Data and effects.
     base : Fit
         The fit to build on.
+    good_cost : float
+        Cost of a fit that leaves nothing to explain. Where no component is likely to get there, nor to explain a
+        considerable part, none is fitted exactly.
 
     Returns
     -------
@@ -143,12 +147,13 @@ def search_component(problem: InferenceProblem, base: Fit) -> Ranking:
             scanned = scan_globally(problem, base)
             n_tried += len(scanned)
             refined = refine_starts(problem, base, scanned)
-            _fit_starts(problem, base, refined, fits)
-            if all(fit.is_far_off for fit in fits.values()):
+            is_of_use = _fit_starts(problem, base, refined, good_cost, fits)
+            if is_of_use and all(fit.is_far_off for fit in fits.values()):
                 _add_beside_nuisance(problem, base, fits)
         if base.is_nearly_right or not (base.is_far_off or any(fit.explains_nearly_all for fit in fits.values())):
-            n_tried += _add_by_score_test(problem, base, fits)  # from far off, what a linear step promises is no match
-        if fits and (n_effects := _count_searched_effects(base, fits)):
+            # from far off, what a linear step promises is no match
+            n_tried += _add_by_score_test(problem, base, good_cost, fits)
+        if fits and (n_effects := _count_searched_effects(base, fits, good_cost)):
             search_neighbourhoods(problem, base, fits, n_effects)
         ranked = rank_fits(problem, fits.values())
     except DeadlineError:
@@ -245,10 +250,11 @@ def _best_costs(scored: Iterable[Start]) -> dict[str, float]:
     return costs
 
 
-def _add_by_score_test(problem: InferenceProblem, base: Fit, fits: Fits) -> int:
-    """Fit small effects from the base, if one linear step promises something."""
+def _add_by_score_test(problem: InferenceProblem, base: Fit, good_cost: float, fits: Fits) -> int:
+    """Fit small effects from the base, if one linear step promises something, and enough to be of use."""
     scored = run_score_test(problem, base)
-    starts = _most_promising(scored, MIN_PROMISE if base.is_nearly_right else MIN_PROMISED_COST * base.cost)
+    promise = MIN_PROMISE if base.is_nearly_right else MIN_PROMISED_COST * base.cost
+    starts = _most_promising(scored, max(promise, PROMISED_PART * (base.cost - _useful_cost(base.cost, good_cost))))
     if not starts and base.is_nearly_right:
         starts = _most_promising(scored, -np.inf)[:1]  # to report how little the best one explains
     for start in starts:
@@ -294,8 +300,8 @@ def keep_better(fits: Fits, fit: Fit) -> None:
         fits[key] = fit
 
 
-def _fit_starts(problem: InferenceProblem, base: Fit, refined: Sequence[Start], fits: Fits) -> None:
-    """Fit with inflated errors first, and then exactly what is not far behind."""
+def _fit_starts(problem: InferenceProblem, base: Fit, refined: Sequence[Start], good_cost: float, fits: Fits) -> bool:
+    """Fit with inflated errors first, and then exactly what is not far behind; False where none is likely of use."""
     known = base.hypothesis.components
     halfway = refine_halfway(problem, [(known, start) for start in refined[:N_ROUGH]])
     candidates = [((*known, start.component), start.values) for known, start in halfway]
@@ -305,18 +311,62 @@ def _fit_starts(problem: InferenceProblem, base: Fit, refined: Sequence[Start], 
         keep_better(fits, best)
         if best.explains_nearly_all:
             _fit_rivals(problem, best, candidates[1:], fits)
-            return
+            return True
     rough_fits += [problem.fit_roughly(*candidate) for candidate in candidates[1:]]
     if all(fit.is_far_off for fit in rough_fits):
         for start in select_apart(refined[:N_ROUGH], 1):
             around = refine_surroundings(problem, (*known, start.component), start.values)[:N_ROUGH_AROUND]
             rough_fits += [problem.fit_roughly(*moved) for moved in around]
     rough_fits.sort(key=lambda fit: fit.cost)
+    if not explain_enough(problem, base, rough_fits, good_cost):
+        return False
     for fit in rough_fits[: count_exact_fits(rough_fits, N_EXACT)]:
         if fit.cost < COST_RATIO * rough_fits[0].cost + COST_SLACK:
             keep_better(fits, problem.fit_exactly(fit, cost_limit=find_cost_limit(fits.values())))
     if not rough_fits[0].is_far_off:
         _fit_other_effects(problem, rough_fits, fits)
+    return True
+
+
+def explain_enough(problem: InferenceProblem, base: Fit, rough_fits: Iterable[Fit], good_cost: float) -> bool:
+    """Tell whether exact fits are of use: one of them may leave nothing, or much less than the base.
+
+    Larger errors make a cost no larger: what leaves more with inflated errors than a fit may that lacks nothing, leaves
+    more with the right ones.
+
+    Parameters
+    ----------
+    problem : InferenceProblem
+        Data and effects.
+    base : Fit
+        With fewer components.
+    rough_fits : iterable of Fit
+        With inflated errors; those that have not converged are continued.
+    good_cost : float
+        Cost of a fit that leaves nothing to explain.
+
+    Returns
+    -------
+    bool
+        True where one is likely to be of use.
+    """
+    rough_fits = list(rough_fits)
+    if min((fit.cost for fit in rough_fits), default=np.inf) <= good_cost:
+        return True
+    of_base = problem.fit_roughly(base.hypothesis.components, base.values, base.nuisance)
+    useful_cost = _useful_cost(of_base.cost, good_cost)
+    return any(fit.cost < useful_cost or _continue_roughly(problem, fit).cost < useful_cost for fit in rough_fits)
+
+
+def _continue_roughly(problem: InferenceProblem, fit: Fit) -> Fit:
+    if fit.has_converged:
+        return fit
+    return problem.fit_roughly(fit.hypothesis.components, fit.values, fit.nuisance)
+
+
+def _useful_cost(base_cost: float, good_cost: float) -> float:
+    """Cost below which one more component is of use: it leaves nothing, or much less than its base."""
+    return max(good_cost, MAX_COST_LEFT * base_cost)
 
 
 def _fit_rivals(
@@ -374,10 +424,13 @@ def _fit_other_effects(problem: InferenceProblem, rough_fits: Sequence[Fit], fit
             keep_better(fits, problem.fit_exactly(fit, cost_limit=find_cost_limit(fits.values())))
 
 
-def _count_searched_effects(base: Fit, fits: Fits) -> int:
+def _count_searched_effects(base: Fit, fits: Fits, good_cost: float = np.inf) -> int:
     """Count the effects worth a neighbourhood search: few, where much is left and none explains it."""
     known = list(fits.values())
     if base.explains_nearly_all:
         return N_EFFECTS if max(fit.log_evidence for fit in known) > base.log_evidence + GAIN else 0
-    is_vain = bool(base.hypothesis.components) and min(fit.cost for fit in known) > VAIN_COST_RATIO * base.cost
+    least = min(fit.cost for fit in known)
+    if least > _useful_cost(base.cost, good_cost):
+        return 0
+    is_vain = bool(base.hypothesis.components) and least > VAIN_COST_RATIO * base.cost
     return N_EFFECTS_IN_VAIN if is_vain else N_EFFECTS

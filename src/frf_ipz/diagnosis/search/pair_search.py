@@ -18,9 +18,11 @@ from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem, compu
 from frf_ipz.diagnosis.evidence.map_fit import fit_map
 from frf_ipz.diagnosis.search.component_search import (
     COST_SLACK,
+    MAX_COST_LEFT,
     PROMISED_PART,
     Ranking,
     count_exact_fits,
+    explain_enough,
     group_by_effect,
     rank_fits,
     search_component,
@@ -50,7 +52,6 @@ if TYPE_CHECKING:
 
 N_OTHERS = 3  # other first components that are tried where a pair explains all
 N_OTHERS_INCOMPLETE = 5  # the same where it lacks a little
-MAX_COST_LEFT = 0.8  # of the cost of one component: if a second leaves more, the first is not searched anew beside it
 COMPETITIVE = 100.0  # log Bayes factor behind the best pair: such a pair's components are located anew
 MAX_SIMPLER = 2  # other effects that are tried for one component of a pair
 MAX_TURNS = 6  # of stepping one component of a pair and then the other
@@ -60,7 +61,9 @@ STEPPED_COST_RATIO = 2.0  # times the best cost: pairs whose neighbours are trie
 N_HALFWAY, N_ROUGH, N_EXACT = 16, 8, 4  # that come half-way to the axis, to it, and are fitted exactly
 
 
-def search_pair(problem: InferenceProblem, first: Ranking, is_good: Callable[[Fit], bool]) -> Ranking:
+def search_pair(
+    problem: InferenceProblem, first: Ranking, is_good: Callable[[Fit], bool], good_cost: float = np.inf
+) -> Ranking:
     """Search for two components.
 
     Parameters
@@ -71,6 +74,8 @@ def search_pair(problem: InferenceProblem, first: Ranking, is_good: Callable[[Fi
         Of one component.
     is_good : callable
         True for a fit that leaves nothing to explain: then nothing further is tried.
+    good_cost : float
+        What such a fit costs at most: what cannot come near it is not fitted exactly.
 
     Returns
     -------
@@ -79,13 +84,15 @@ def search_pair(problem: InferenceProblem, first: Ranking, is_good: Callable[[Fi
     """
     rankings: list[Ranking] = []
     if not first.best.is_far_off or not first.refined:
-        beside = search_component(problem, first.best)
+        beside = search_component(problem, first.best, good_cost=good_cost)
         rankings.append(beside)
         if beside.fits and not is_good(beside.best) and beside.best.cost < MAX_COST_LEFT * first.best.cost:
-            rankings.append(search_component(problem, _fit_newest_alone(problem, beside.best)))
+            newest = _fit_newest_alone(problem, beside.best)
+            rankings.append(search_component(problem, newest, good_cost=good_cost))
     is_open = first.refined and not first.best.explains_nearly_all
     if is_open and not any(ranking.fits and is_good(ranking.best) for ranking in rankings):
-        rankings += _search_far_pairs(problem, first, min((ranking.best.cost for ranking in rankings), default=np.inf))
+        cost_to_beat = min((ranking.best.cost for ranking in rankings), default=np.inf)
+        rankings += _search_far_pairs(problem, first, cost_to_beat, good_cost)
     if not rankings:  # of effects without a location there is one component only
         return first
     best = _most_probable(rankings)
@@ -184,7 +191,9 @@ def _fit_newest_alone(problem: InferenceProblem, fit: Fit) -> Fit:
     return problem.fit((fit.hypothesis.components[-1],), fit.values[len(fit.values) - count :])
 
 
-def _search_far_pairs(problem: InferenceProblem, first: Ranking, cost_to_beat: float) -> list[Ranking]:
+def _search_far_pairs(
+    problem: InferenceProblem, first: Ranking, cost_to_beat: float, good_cost: float
+) -> list[Ranking]:
     """Search for pairs far from the axis; the best one is stepped to better locations if it beats a cost."""
     starts = select_apart(first.refined, 1)[:N_FIRSTS]
     pairs: list[tuple[Component, Start]] = []
@@ -193,8 +202,10 @@ def _search_far_pairs(problem: InferenceProblem, first: Ranking, cost_to_beat: f
             pairs += [(start.component, start_of_both) for start_of_both in _find_companions(problem, start)]
     if not pairs:  # effects that sit nowhere have no companions
         return []
-    exact: list[Fit] = []
-    for fit in _fit_pairs_roughly(problem, pairs):
+    rough_fits, exact = _fit_pairs_roughly(problem, pairs), list[Fit]()
+    if not explain_enough(problem, first.best, rough_fits, good_cost):
+        return []
+    for fit in rough_fits:
         exact.append(problem.fit_exactly(fit, cost_limit=find_cost_limit(exact)))
     best = max(exact, key=lambda fit: fit.log_evidence)
     if best.cost > cost_to_beat:

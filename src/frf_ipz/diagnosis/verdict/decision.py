@@ -136,9 +136,9 @@ def _decide_in_steps(problem: InferenceProblem, nothing: Decision, progress: Pro
     ):
         return
     progress(0.8, "searching for a third effect")
-    third = _accept_further(
-        problem, pair_decision, search_small_component(problem, second.best, STRONG_LOG_BAYES_FACTOR)
-    )
+    missing_gain = second.best.cost - pair_decision.goodness.good_cost(second.best.n_values)
+    required = max(STRONG_LOG_BAYES_FACTOR, missing_gain)  # with less it is refused
+    third = _accept_further(problem, pair_decision, search_small_component(problem, second.best, required))
     if third is not None and third.verdict == DiagnosisVerdict.EXPLAINED:
         yield third
 
@@ -172,8 +172,9 @@ def _accept_first(problem: InferenceProblem, first: Decision) -> Decision:
 
 def _search_pair(problem: InferenceProblem, ranking: Ranking) -> Ranking:
     """Search for two components of which neither need be the best one alone."""
+    good_cost = assess_goodness(problem, ranking.best).good_cost(ranking.best.n_values)
     return rescore_ambiguity_set(
-        problem, search_pair(problem, ranking, lambda fit: assess_goodness(problem, fit).is_good)
+        problem, search_pair(problem, ranking, lambda fit: assess_goodness(problem, fit).is_good, good_cost)
     )
 
 

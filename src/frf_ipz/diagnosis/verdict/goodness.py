@@ -124,6 +124,21 @@ class Goodness:
         )[int(np.argmax(self._over_limits))]
         return f"the best explanation {worst}"
 
+    def good_cost(self, n_values: int) -> float:
+        """Compute what a fit costs at most that leaves nothing to explain.
+
+        Parameters
+        ----------
+        n_values : int
+            Number of real values that it is fitted to.
+
+        Returns
+        -------
+        float
+            That of the largest misfit and the largest nuisance parameters.
+        """
+        return 0.5 * (self.limits.misfit * n_values + self.nuisance_chi2_limit)
+
     @property
     def error_underestimation(self) -> float:
         """Factor by which errors of a good model are underestimated somewhere: what is beside it needs so much more."""

@@ -73,10 +73,20 @@ def test_the_parameters_of_the_best_location_are_tried_at_the_next_best_and_its_
         ),
     )
     if location == 9:
-        assert not candidates._exchange_locations(problem, list(fits), neighbours=False)
-    assert candidates._exchange_locations(problem, fits, neighbours=True) == (best != 7)
+        assert not candidates._exchange_locations(problem, list(fits), {}, neighbours=False)
+    assert candidates._exchange_locations(problem, fits, {}, neighbours=True) == (best != 7)
     assert fits[0].location == best
     assert len(fits) == 4  # each location once
+
+
+def test_no_location_is_tried_twice_with_the_same_parameters():
+    law = SimpleNamespace(name="friction")
+    best, other = (
+        SimpleNamespace(law=law, location=at, cost=cost, strength=1.0) for at, cost in ((7, 10.0), (3, 15.0))
+    )
+    problem = SimpleNamespace(neighbours_of=lambda _: [3, 9])  # it fits nothing
+    moved_from = {("friction", 3): best, ("friction", 9): best}
+    assert not candidates._exchange_locations(problem, [best, other], moved_from, neighbours=True)
 
 
 def test_fits_that_come_close_to_the_best_converge_before_they_are_compared(monkeypatch):
@@ -100,7 +110,7 @@ def test_neighbours_are_fitted_again_if_the_cost_fell(monkeypatch, ratio, neighb
     monkeypatch.setattr(candidates, "_search_neighbours", lambda *_: None)
     monkeypatch.setattr(candidates, "_converge_best", lambda _, fits: fits.append(law_at(7, ratio * fits[0].cost)))
     monkeypatch.setattr(
-        candidates, "_exchange_locations", lambda _, __, neighbours: calls.append(neighbours) or len(calls) == 1
+        candidates, "_exchange_locations", lambda *_, neighbours: calls.append(neighbours) or len(calls) == 1
     )
     candidates._finish(None, [law_at(7, 100.0)])
     assert calls == [neighbours, True]  # a better location has neighbours of its own

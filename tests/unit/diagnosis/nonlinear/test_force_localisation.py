@@ -76,12 +76,28 @@ def test_a_location_is_fitted_from_a_neighbour_that_explains(localised, monkeypa
         location for location in range(len(modal_model.locations)) if best in neighbours(modal_model, location, 1)
     )
 
-    def in_local_minimum(segments, linear, location, nuisance=None):
+    def in_local_minimum(segments, linear, location, nuisance=None, **_):
         free = fit_free_force(segments, linear, location, nuisance)
         return free if location == neighbour or nuisance is not None else replace(free, cost=free.cost + 1e12)
 
     monkeypatch.setattr(force_localisation, "fit_free_force", in_local_minimum)
     assert localise_force(segments, linear).equivalent[0] == best
+
+
+def test_a_location_is_fitted_only_as_far_as_a_force_may_act_there(localised, monkeypatch):
+    """The better the best one so far explains, the less may be left elsewhere."""
+    segments, linear, localisation = localised("cubic")
+    limits = []
+
+    def fit(*given, cost_limit):
+        limits.append(cost_limit)
+        return fit_free_force(*given, cost_limit=cost_limit)
+
+    monkeypatch.setattr(force_localisation, "fit_free_force", fit)
+    assert localise_force(segments, linear).equivalent == localisation.equivalent
+    assert limits[0] == np.inf
+    assert limits[1:] == sorted(limits[1:], reverse=True)
+    assert limits[-1] < 0.01 * linear.cost
 
 
 def test_a_free_force_leaves_less_than_a_law_at_its_location_however_far_off_the_model_starts(chain_like, strike):

@@ -216,6 +216,24 @@ def test_fits_are_rescored_where_one_of_them_may_explain(monkeypatch, objection,
         linear=SimpleNamespace(cost=1e5, nuisance_prior=None),
         segments=SimpleNamespace(moving=np.zeros(2, bool)),
     )
-    ranked, _ = search._rank(problem, fits, always_rescores=always)
+    ranked, _ = search._rank(problem, fits, lambda _: 0.0, always_rescores=always)
     assert len(rescored) == n_rescored
     assert [fit.location for fit in ranked] == ([4, 3, 5] if n_rescored else [3, 4, 5])
+
+
+@pytest.mark.parametrize(("other_gain", "n_rescored"), [(50.0, 2), (5000.0, 0)])
+def test_fits_are_not_rescored_where_all_of_them_have_the_wrong_shape(monkeypatch, other_gain, n_rescored):
+    """Whatever the variance of the data, other forces at their locations explain what they leave."""
+    rescored = []
+    monkeypatch.setattr(search, "rescore", lambda _, fits: rescored.extend(fits) or (fits, np.zeros(len(fits))))
+    monkeypatch.setattr(search, "assess_agreement", lambda *_: Agreement(1e4, 1.0))
+    monkeypatch.setattr(search, "is_determined", lambda *_: True)
+    monkeypatch.setattr(search, "relative_misfit", lambda *_: 0.003)
+    problem = SimpleNamespace(
+        linear=SimpleNamespace(cost=1e4, nuisance_prior=None), segments=SimpleNamespace(moving=np.zeros(2, bool))
+    )
+    fits = [law_at(3, 90.0), law_at(4, 91.0)]
+    for fit in fits:
+        fit.misfit = None
+    search._rank(problem, fits, lambda _: other_gain, always_rescores=False)
+    assert len(rescored) == n_rescored

@@ -50,7 +50,7 @@ def test_nothing_is_scored_from_far_off_where_one_effect_explains_nearly_all(
     fit = SimpleNamespace(explains_nearly_all=is_explained, is_far_off=False)
     monkeypatch.setattr(component_search, "scan_globally", lambda *_: [])
     monkeypatch.setattr(component_search, "refine_starts", lambda *_: [])
-    monkeypatch.setattr(component_search, "_fit_starts", lambda *given: given[-1].update(key=fit))
+    monkeypatch.setattr(component_search, "_fit_starts", lambda *given: given[-1].update(key=fit) or True)
     monkeypatch.setattr(component_search, "_add_by_score_test", lambda *_: scored.append(1) or 0)
     monkeypatch.setattr(component_search, "_count_searched_effects", lambda *_: 0)
     monkeypatch.setattr(component_search, "rank_fits", lambda _, fits: tuple(fits))

@@ -14,6 +14,7 @@ from frf_ipz.diagnosis.catalogue.finder import shipped_effects
 from frf_ipz.diagnosis.catalogue.joint_change import build_together
 from frf_ipz.diagnosis.diagnose import diagnose
 from frf_ipz.diagnosis.evidence.hypothesis import Component
+from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
 from frf_ipz.diagnosis.location import Location
 from frf_ipz.diagnosis.model.change import with_change
 from frf_ipz.diagnosis.options import DiagnoseOptions
@@ -170,6 +171,27 @@ def test_neighbourhoods_are_searched_only_where_an_effect_explains_something(nom
     heavier = problem_of(nominal, measured(with_point_masses(nominal, {12: 0.02})), names)
     keys = {fit.hypothesis.components[0].key for fit in search_component(heavier, fit_null_model(heavier)).fits}
     assert {("added_mass", Location.at_node(node, "z")) for node in (11, 12, 13)} <= keys
+
+
+def test_no_second_effect_is_fitted_exactly_where_none_may_explain_the_rest(nominal, monkeypatch):
+    """A spring that no effect of the list describes; with inflated errors, all leave nearly as much as one does."""
+    true = with_springs(nominal, {Dof(8, "z"): 30 * WEAK_N_M})
+    problem = problem_of(nominal, measured(true), ("sensor_gain", "time_delay", "damping_level"))
+    first = search_component(problem, fit_null_model(problem)).best
+    good_cost = assess_goodness(problem, first).good_cost(first.n_values)
+    fitted, fit_exactly = [], InferenceProblem.fit_exactly
+
+    def count(*given, **options):
+        fitted.append(1)
+        return fit_exactly(*given, **options)
+
+    monkeypatch.setattr(InferenceProblem, "fit_exactly", count)
+    beside = search_component(problem, first, good_cost=good_cost)
+    n_fitted = len(fitted)
+    every = search_component(problem, first)
+    assert n_fitted < len(fitted) - n_fitted
+    assert not assess_goodness(problem, every.best).is_good
+    assert not assess_goodness(problem, beside.best).is_good
 
 
 def test_nothing_is_added_to_an_effect_that_explains_all(nominal):
@@ -347,7 +369,7 @@ def test_a_resonator_of_much_damping_is_less_likely_than_a_damper_that_explains_
 @pytest.mark.parametrize(("is_good", "count"), [(True, pairs.N_OTHERS), (False, pairs.N_OTHERS_INCOMPLETE)])
 def test_more_firsts_are_tried_where_no_pair_explains_all(monkeypatch, is_good, count):
     tried = []
-    monkeypatch.setattr(pairs, "search_component", lambda _, base: Ranking(base=base, fits=(), n_tried=0))
+    monkeypatch.setattr(pairs, "search_component", lambda _, base, **__: Ranking(base=base, fits=(), n_tried=0))
     monkeypatch.setattr(
         pairs,
         "search_small_component",

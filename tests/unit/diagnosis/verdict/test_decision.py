@@ -15,12 +15,19 @@ N_KINDS = 18
 
 def a_fit(log_evidence, name="local_stiffness"):
     component = SimpleNamespace(effect=SimpleNamespace(name=name))
-    return SimpleNamespace(hypothesis=SimpleNamespace(components=(component,)), log_evidence=log_evidence)
+    return SimpleNamespace(
+        hypothesis=SimpleNamespace(components=(component,)), log_evidence=log_evidence, cost=-log_evidence, n_values=100
+    )
 
 
 def goodness_of(score, underrated=1.0, kind="hammer"):
     return SimpleNamespace(
-        is_good=score <= 1, score=score, error_underestimation=underrated, limits=LIMITS[kind], misfit=0.5
+        is_good=score <= 1,
+        score=score,
+        error_underestimation=underrated,
+        limits=LIMITS[kind],
+        misfit=0.5,
+        good_cost=lambda n_values: 0.5 * n_values,
     )
 
 
@@ -113,6 +120,29 @@ def test_what_an_effect_leaves_in_a_subband_shows_whether_errors_are_underestima
     monkeypatch.setattr(decision, "is_significant", lambda *_: True)
     monkeypatch.setattr(decision, "search_small_component", lambda *_: Ranking(base=best, fits=(), n_tried=1))
     assert decision.decide(problem_of_kind("hammer"), lambda *_: None).verdict == verdict
+
+
+@pytest.mark.parametrize(("cost", "required"), [(150.0, 200.0), (9000.0, 8950.0)])
+def test_a_third_component_is_searched_for_only_as_far_as_it_may_leave_nothing(monkeypatch, cost, required):
+    """It is refused otherwise: what it has to promise is what the two lack."""
+    first, asked = found(9.0), []
+    pair = a_fit(ALONE + 1000.0)
+    pair.cost, pair.is_nearly_right = cost, True
+    second = Ranking(base=first.final, fits=(pair,), n_tried=9)
+    monkeypatch.setattr(decision, "assess_goodness", lambda _, fit: goodness_of(2.0 if fit is pair else 9.0))
+    monkeypatch.setattr(decision, "search_component", lambda *_: first.ranking)
+    monkeypatch.setattr(decision, "_judge_first", lambda *_: first)
+    monkeypatch.setattr(decision, "_search_pair", lambda *_: second)
+    monkeypatch.setattr(decision, "_drop_needless", lambda *_: None)
+    first.final.explains_nearly_all = False
+
+    def search(_, base, nats):
+        asked.append(nats)
+        return Ranking(base=base, fits=(), n_tried=1)
+
+    monkeypatch.setattr(decision, "search_small_component", search)
+    list(decision._decide_in_steps(problem_of_kind("hammer"), found(9.0), lambda *_: None))
+    assert asked == [pytest.approx(required)]
 
 
 @pytest.mark.parametrize(("score", "n_components"), [(0.7, 1), (0.8, 2)])

@@ -52,7 +52,7 @@ class LawFit:
         Number of real data.
     estimate_covariance : callable
         Gives the (2, 2) covariance of strength and shape, all nuisance parameters free, for data whose variance is
-        right. It is asked of few of many fits.
+        right. It is asked of few of many fits, and of those whose simulation has been forgotten.
     motion, velocity : (n_segments, n_times) array
         Of the location, m and m/s.
     force : (n_segments, n_lines) complex array
@@ -83,7 +83,7 @@ class LawFit:
     @property
     def numbers(self) -> dict[str, tuple[float, float]]:
         """The law's parameters by their names, each with its variance."""
-        covariance = self.estimate_covariance()
+        covariance = self.estimate_covariance() if self.simulation is None else self.simulation.covariance
         numbers = {self.law.strength_name: (self.strength, float(covariance[0, 0]))}
         if self.law.shape_name:
             numbers[self.law.shape_name] = (self.shape, float(covariance[1, 1]))

@@ -23,9 +23,12 @@ from frf_ipz.diagnosis.nonlinear.model.modal_model import respond
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
+    from typing import TypeAlias
 
     from frf_ipz.diagnosis.nonlinear.fitting.problem import LawFitProblem
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
+
+    _Key: TypeAlias = tuple[str, int]  # of a law and its location
 
 OF_EACH_LAW = 3  # scored locations that are fitted in alternation
 OF_ALL_LAWS = 5
@@ -127,20 +130,21 @@ def _not_yet_fitted(fits: Sequence[LawFit], fitted: Sequence[LawFit]) -> list[La
 def _simulate_with_neighbours(problem: LawFitProblem, starts: Iterable[LawFit]) -> list[LawFit]:
     """Fit by simulation, the neighbours of the best too; the smallest cost first."""
     fits = _simulate(problem, _first_of_each(starts))
-    _search_neighbours(problem, fits)
+    _search_neighbours(problem, fits, {})
     return sorted(fits, key=lambda fit: fit.cost)
 
 
 def _finish(problem: LawFitProblem, finalists: Iterable[LawFit]) -> list[LawFit]:
     """Fit to the long segments, the best until it converges; the smallest cost first."""
     fits = _simulate(problem, _first_of_each(finalists), max_ratio=MAX_COST_RATIO_LONG)
-    _search_neighbours(problem, fits)
+    moved_from: dict[_Key, LawFit] = {}
+    _search_neighbours(problem, fits, moved_from)
     if fits:
         least = min(fit.cost for fit in fits)
         _converge_best(problem, fits)
         has_improved = min(fit.cost for fit in fits) < (1 - BETTER) * least
         for _ in range(EXCHANGES):
-            if not _exchange_locations(problem, fits, neighbours=has_improved):
+            if not _exchange_locations(problem, fits, moved_from, neighbours=has_improved):
                 break
             _converge_best(problem, fits)
             has_improved = True
@@ -248,10 +252,13 @@ def _converge_ties(problem: LawFitProblem, fits: list[LawFit]) -> None:
             fits[number] = min(fit, problem.fit_output_error(fit, MORE_STEPS), key=lambda candidate: candidate.cost)
 
 
-def _exchange_locations(problem: LawFitProblem, fits: list[LawFit], *, neighbours: bool) -> bool:
+def _exchange_locations(
+    problem: LawFitProblem, fits: list[LawFit], moved_from: dict[_Key, LawFit], *, neighbours: bool
+) -> bool:
     """Fit the best law at its next best locations from its best parameters, and at its neighbours if asked.
 
-    They were fitted from worse parameters, and may have ended in a local minimum. True if one becomes the best of all.
+    They were fitted from worse parameters, unless `moved_from` says that it was from these, and may have ended in a
+    local minimum. True if one becomes the best of all.
     """
     best = min(fits, key=lambda fit: fit.cost)
     likely = [fit for fit in fits if fit.law is best.law and best.cost < fit.cost < LIKELY * best.cost]
@@ -261,13 +268,15 @@ def _exchange_locations(problem: LawFitProblem, fits: list[LawFit], *, neighbour
         for location in (problem.neighbours_of(best.location) if neighbours else [])
         if location not in locations
     ]
-    refitted = _simulate(problem, [_move_law(problem, best, location) for location in locations], least=best.cost)
+    new = [location for location in locations if moved_from.get((best.law.name, location)) is not best]
+    moved_from.update(dict.fromkeys(((best.law.name, location) for location in new), best))
+    refitted = _simulate(problem, [_move_law(problem, best, location) for location in new], least=best.cost)
     fits[:] = _best_of_each(fits + refitted)
     return fits[0] is not best
 
 
-def _search_neighbours(problem: LawFitProblem, fits: list[LawFit]) -> None:
-    """Fit the neighbours of the best fit, as long as one of them is better."""
+def _search_neighbours(problem: LawFitProblem, fits: list[LawFit], moved_from: dict[_Key, LawFit]) -> None:
+    """Fit the neighbours of the best fit, as long as one of them is better; note in `moved_from` from which."""
     fitted = {(fit.law.name, fit.location) for fit in fits}
     for _ in range(NEIGHBOUR_STEPS if fits else 0):
         best = min(fits, key=lambda fit: fit.cost)
@@ -275,6 +284,7 @@ def _search_neighbours(problem: LawFitProblem, fits: list[LawFit]) -> None:
         if not new:
             return
         fitted |= {(best.law.name, location) for location in new}
+        moved_from.update(dict.fromkeys(((best.law.name, location) for location in new), best))
         moved = [_move_law(problem, best, location) for location in new]
         max_ratio = MAX_COST_RATIO_NEIGHBOUR if best.cost < best.n_rows else MAX_COST_RATIO
         fits += _simulate(problem, moved, max_ratio=max_ratio, least=best.cost)

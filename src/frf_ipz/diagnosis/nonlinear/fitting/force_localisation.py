@@ -17,9 +17,11 @@ from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import as_real_rows, linear_
 from frf_ipz.diagnosis.nonlinear.fitting.location_motion import NumericalLaplace
 from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import ROUNDING
 from frf_ipz.diagnosis.nonlinear.model.modal_model import respond
-from frf_ipz.numerics.levenberg_marquardt import LevenbergMarquardt, NormalEquations, minimise
+from frf_ipz.numerics.levenberg_marquardt import AcceptedStep, LevenbergMarquardt, NormalEquations, minimise
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import LinearFit
     from frf_ipz.diagnosis.nonlinear.laws.law import Law
@@ -88,7 +90,12 @@ def all_locations(modal_model: ModalModel) -> ForceLocalisation:
 
 
 def fit_free_force(
-    segments: SegmentSet, linear: LinearFit, location: int, nuisance: FloatArray | None = None
+    segments: SegmentSet,
+    linear: LinearFit,
+    location: int,
+    nuisance: FloatArray | None = None,
+    *,
+    cost_limit: float = np.inf,
 ) -> FreeForce:
     """Fit the linear model with any force at a location.
 
@@ -102,6 +109,8 @@ def fit_free_force(
         Index in `ModalModel.locations`.
     nuisance : (n_nuisance,) array, optional
         Start values; the nominal model otherwise.
+    cost_limit : float
+        Below which a fit is of use: one that is unlikely to get there is stopped early.
 
     Returns
     -------
@@ -110,7 +119,11 @@ def fit_free_force(
     """
     problem = _FreeForceProblem(segments=segments, linear=linear, location=location)
     start = _project(segments, linear, location, linear.start_nuisance if nuisance is None else nuisance)
-    best = minimise(problem, start, SETTINGS).point
+
+    def is_of_no_use(step: AcceptedStep[_Projection]) -> bool:
+        return not step.can_reach(cost_limit, step.after.cost)
+
+    best = minimise(problem, start, SETTINGS, stop=is_of_no_use).point
     return FreeForce(location=location, cost=best.cost, force=-best.force, nuisance=best.nuisance)
 
 
@@ -159,37 +172,65 @@ def localise_force(segments: SegmentSet, linear: LinearFit) -> ForceLocalisation
     everywhere = all_locations(linear.nuisance_prior.modal_model)
     if np.isfinite(segments.variance).any(2).sum(1).min() < MIN_SENSORS:
         return everywhere
-    forces = {location: fit_free_force(segments, linear, location) for location in everywhere.possible}
+    forces = _fit_everywhere(segments, linear, everywhere.possible)
     _refit_neighbours(segments, linear, forces)
     best_first = sorted(forces.values(), key=lambda free: free.cost)
-    least = best_first[0].cost
+    least, cost_limit = best_first[0].cost, _possible_cost(forces.values())
     equivalent = tuple(free for free in best_first if free.cost < least + INDISTINGUISHABLE)
-    possible = tuple(free.location for free in best_first if _is_possible(free, least))
+    possible = tuple(free.location for free in best_first if free.cost < cost_limit)
     return ForceLocalisation(
         possible=possible, equivalent=tuple(free.location for free in equivalent), forces=equivalent
     )
 
 
+def _fit_everywhere(segments: SegmentSet, linear: LinearFit, locations: Sequence[int]) -> dict[int, FreeForce]:
+    """Fit a force at each location, those first where it explains most beside the nominal model.
+
+    The better the best of them explains, the sooner it shows of another one that no force can act there. From the
+    nuisance parameters of the best one, most are a single step away.
+    """
+
+    def unfitted_cost(location: int, nuisance: FloatArray) -> float:
+        return _project(segments, linear, location, nuisance).cost
+
+    nominal = best = linear.start_nuisance
+    forces: dict[int, FreeForce] = {}
+    for location in sorted(locations, key=lambda location: unfitted_cost(location, nominal)):
+        start = min((nominal, best), key=lambda nuisance: unfitted_cost(location, nuisance))
+        cost_limit = _possible_cost(forces.values())
+        forces[location] = fit_free_force(segments, linear, location, start, cost_limit=cost_limit)
+        best = linear.nuisance_prior.without_location(min(forces.values(), key=lambda free: free.cost).nuisance)
+    return forces
+
+
 def _refit_neighbours(segments: SegmentSet, linear: LinearFit, forces: dict[int, FreeForce]) -> None:
-    """Fit neighbours of possible locations from the fit there: from the nominal model, some end in a local minimum."""
+    """Fit neighbours of possible locations from the fit there: from the nominal model, some end in a local minimum.
+
+    What was fitted from a better one already is not fitted again.
+    """
     modal_model = linear.nuisance_prior.modal_model
     waiting = sorted(forces, key=lambda location: forces[location].cost)
+    best_start = dict.fromkeys(forces, np.inf)
     while waiting:
         free = forces[waiting.pop(0)]
-        if not _is_possible(free, min(fitted.cost for fitted in forces.values())):
+        cost_limit = _possible_cost(forces.values())
+        if free.cost >= cost_limit:
             continue
         start = linear.nuisance_prior.without_location(free.nuisance)
         for location in neighbours(modal_model, free.location, NEIGHBOURS):
-            if forces[location].cost < free.cost + INDISTINGUISHABLE:
+            if free.cost > min(forces[location].cost - INDISTINGUISHABLE, best_start[location]):
                 continue
-            refitted = fit_free_force(segments, linear, location, start)
+            best_start[location] = free.cost
+            refitted = fit_free_force(segments, linear, location, start, cost_limit=cost_limit)
             if refitted.cost < forces[location].cost:
                 forces[location] = refitted
                 waiting.append(location)
 
 
-def _is_possible(free: FreeForce, least: float) -> bool:
-    return free.cost < least + POSSIBLE + POSSIBLE_PART * least
+def _possible_cost(forces: Iterable[FreeForce]) -> float:
+    """Cost below which a force is possible beside the best of those that are known."""
+    least = min((free.cost for free in forces), default=np.inf)
+    return least + POSSIBLE + POSSIBLE_PART * least
 
 
 def neighbours(modal_model: ModalModel, location: int, count: int) -> list[int]:

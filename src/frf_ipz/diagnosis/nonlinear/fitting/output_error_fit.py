@@ -85,6 +85,17 @@ class Simulation:
         """Derivatives by nuisance, strength and shape."""
         return _normal_equations(self, _derivative_rows(self))
 
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """(2, 2) covariance of strength and shape."""
+        equations, n = self.equations, len(self.start.nuisance)
+        n_law = len(equations.right) - n
+        inverse = solve_scaled(equations.matrix, np.eye(n + n_law)[:, n:])[n:]
+        sizes = np.array([self.start.strength, self.start.shape])[:n_law]
+        covariance = np.zeros((2, 2))
+        covariance[: len(sizes), : len(sizes)] = inverse * sizes * sizes[:, None]
+        return covariance
+
     def is_of(self, segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart) -> bool:
         """Tell whether these data would be simulated with these numbers."""
         simulated, time_response = self.start, self.time_response
@@ -127,8 +138,7 @@ def fit_output_error(
         The best simulation.
     """
     problem = _OutputErrorProblem(segments=segments, nuisance_prior=nuisance_prior)
-    is_known = known is not None and known.is_of(segments, nuisance_prior, start)
-    simulation = known if known is not None and is_known else _simulate(segments, nuisance_prior, start)
+    simulation = _simulate_unless_known(segments, nuisance_prior, start, known)
     while not np.isfinite(simulation.cost):  # a softening spring that is too strong diverges
         weaker = replace(simulation.start, strength=WEAKER * simulation.start.strength)
         simulation = _simulate(segments, nuisance_prior, weaker)
@@ -166,7 +176,12 @@ class _OutputErrorProblem:
 
 
 def gain_of_added_forces(
-    segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart, force_basis: ForceBasis
+    segments: SegmentSet,
+    nuisance_prior: NuisancePrior,
+    start: LawStart,
+    force_basis: ForceBasis,
+    *,
+    known: Simulation | None = None,
 ) -> float:
     """Compute how far other forces at a law's location, free in all their strengths, would lower the cost.
 
@@ -180,13 +195,15 @@ def gain_of_added_forces(
         The law as it was fitted.
     force_basis : callable
         Gives the forces, (n_forces, n_segments, n_times), for motion and velocity.
+    known : Simulation, optional
+        Used where it is one of the start with these segments.
 
     Returns
     -------
     float
         Drop of the weighted sum of squares, linearised in the strengths.
     """
-    simulation = _simulate(segments, nuisance_prior, start)
+    simulation = _simulate_unless_known(segments, nuisance_prior, start, known)
     forces = force_basis(simulation.history.motion, simulation.history.velocity)
     rows = _derivative_rows(simulation, forces)
     n_plain = len(rows) - len(forces)
@@ -196,6 +213,13 @@ def gain_of_added_forces(
     normal, right = equations.matrix, equations.right
     drops = [right[:n] @ solve_scaled(normal[:n, :n], right[:n]) for n in (n_plain, len(rows))]
     return float(drops[1] - drops[0])
+
+
+def _simulate_unless_known(
+    segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart, known: Simulation | None
+) -> Simulation:
+    is_known = known is not None and known.is_of(segments, nuisance_prior, start)
+    return known if known is not None and is_known else _simulate(segments, nuisance_prior, start)
 
 
 def _simulate(segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart) -> Simulation:
@@ -285,7 +309,9 @@ def _as_law_fit(simulation: Simulation, *, converged: bool) -> LawFit:
         nuisance=start.nuisance,
         cost=simulation.cost,
         n_rows=len(simulation.misfit),
-        estimate_covariance=cache(partial(_covariance, time_response.segments, time_response.nuisance_prior, start)),
+        estimate_covariance=cache(
+            partial(_estimate_covariance, time_response.segments, time_response.nuisance_prior, start)
+        ),
         motion=simulation.history.motion,
         velocity=simulation.history.velocity,
         force=simulation.force,
@@ -295,12 +321,5 @@ def _as_law_fit(simulation: Simulation, *, converged: bool) -> LawFit:
     )
 
 
-def _covariance(segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart) -> FloatArray:
-    """(2, 2) covariance of strength and shape."""
-    equations, n = _simulate(segments, nuisance_prior, start).equations, len(start.nuisance)
-    n_law = len(equations.right) - n
-    inverse = solve_scaled(equations.matrix, np.eye(n + n_law)[:, n:])[n:]
-    sizes = np.array([start.strength, start.shape])[:n_law]
-    covariance = np.zeros((2, 2))
-    covariance[: len(sizes), : len(sizes)] = inverse * sizes * sizes[:, None]
-    return covariance
+def _estimate_covariance(segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart) -> FloatArray:
+    return _simulate(segments, nuisance_prior, start).covariance

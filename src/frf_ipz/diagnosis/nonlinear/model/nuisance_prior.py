@@ -214,7 +214,8 @@ class NuisancePrior:
 
         def at_sensors(modal: ComplexArray) -> ComplexArray:
             """(n_free, n_segments, n_sensors, n_used) from modal motion (n_segments, n_free, n_used)."""
-            return np.asarray(modal.swapaxes(0, 1)[:, :, None] * shapes[:, None, :, None] * weight)
+            by_mode = np.ascontiguousarray(modal.swapaxes(0, 1))  # else the product has an order that is slow to read
+            return np.asarray(by_mode[:, :, None] * shapes[:, None, :, None] * weight)
 
         parts = [at_sensors(motion * by_frequency * self.frequency[:, None]), at_sensors(motion * by_damping)]
         parts.append(_derive_by_sensor_shapes(motion.swapaxes(0, 1), self.sensors, weight))
