@@ -313,8 +313,18 @@ def test_a_model_that_is_too_heavy_is_said_by_frequencies_and_amplitudes():
 
 def test_a_mass_that_is_as_good_as_others_is_not_in_doubt(evidence):
     assert list(quality.level(evidence)) == []
-    scale = replace(evidence.updated_model.scale, level=1.04)
+    scale = replace(evidence.updated_model.scale, level=1.01)
     assert list(quality.level(replace(evidence, updated_model=replace(evidence.updated_model, scale=scale)))) == []
+
+
+@pytest.mark.parametrize(("factor", "called"), [(0.965, "3.5 % lighter"), (1.04, "4 % heavier")])
+def test_a_mass_that_is_off_by_no_more_than_others_is_said_and_costs_nothing(evidence, factor, called):
+    scale = replace(evidence.updated_model.scale, level=factor)
+    check = the(quality.level, replace(evidence, updated_model=replace(evidence.updated_model, scale=scale)))
+    assert check.verdict is USABLE
+    assert f"either the model is {called} than the machine (90 %: " in check.says
+    assert "bands reach from one to the other" in check.says
+    assert check.advice
 
 
 @pytest.fixture(scope="module")

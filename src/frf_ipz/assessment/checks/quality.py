@@ -207,7 +207,8 @@ def level(evidence: Evidence) -> Iterator[Check]:
     Yields
     ------
     Check
-        One, where the factor is beyond its own error and what masses of models are off.
+        One, where the factor is beyond its own error; it costs the verdict where it is beyond what masses of models are
+        off as well.
     """
     updated = evidence.updated_model
     is_updated = updated.expansion is None  # measured shapes have the measured amplitudes
@@ -219,7 +220,7 @@ def level(evidence: Evidence) -> Iterator[Check]:
     is_told = abs(log_factor) > NO_CHANCE * factor_std
     is_told &= abs(log_factor - doubt) < NORMAL_90 * float(np.hypot(fitted.level_std, factor_std))
     limit = (NORMAL_90 if is_told else NO_CHANCE) * float(np.hypot(fitted.level_std, MASS_STD))
-    if abs(doubt) <= limit:
+    if abs(doubt) <= min(limit, NO_CHANCE * fitted.level_std):
         return
     low, high = (np.exp(doubt + side * NORMAL_90 * fitted.level_std) for side in (-1, 1))
     off, *ends = (100 * abs(float(np.expm1(value))) for value in (doubt, np.log(low), np.log(high)))
@@ -234,7 +235,7 @@ def level(evidence: Evidence) -> Iterator[Check]:
         )
     yield Check(
         name="mass of the model",
-        verdict=Verdict.WITH_CARE,
+        verdict=Verdict.WITH_CARE if abs(doubt) > limit else Verdict.USABLE,
         figure=abs(doubt),
         limit=limit,
         unit="1",
