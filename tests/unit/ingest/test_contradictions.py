@@ -73,6 +73,11 @@ def flatten(signals):
     return signals
 
 
+def silence(signals):
+    signals[1] = -0.0
+    return signals
+
+
 def settle(signals):
     signals[1] += 20.0 * np.exp(-np.arange(signals.shape[1]) * STEP_S / 0.5)
     return signals
@@ -171,6 +176,7 @@ def test_lost_samples_are_found_where_no_response_alone_tells_it_of_few_impacts(
         (in_g, "acc_1 contradicts the other impacts: it is 0.102 times as large"),
         (kill, "acc_1 is dead: nothing in it follows the force"),
         (flatten, "acc_1 is dead: all its samples are 0.25"),
+        (silence, "acc_1 is dead: all its samples are 0"),
         (overload, "overload of acc_1"),
         (settle, "acc_1 is settling"),
     ],

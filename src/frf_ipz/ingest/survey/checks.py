@@ -217,7 +217,7 @@ def find_record_faults(test: VibrationTest, step_s: float, signals: FloatArray) 
     for channel, force in zip(test.input_channels, signals[:n_inputs], strict=True):
         once = force[-find_period(np.abs(force)) :]
         if not np.ptp(force):
-            faults.append(f"{channel.column} {STANDS_STILL} {force[0]:.4g}")
+            faults.append(f"{channel.column} {STANDS_STILL} {force[0]:z.4g}")
         elif is_clipped(once):
             faults.append(f"clipping of {channel.column}")
     once = slice(-find_period(np.abs(signals[0])), None)
@@ -256,7 +256,7 @@ def _find_bad_channels(
     faults: list[tuple[int, str]] = []
     for output, (channel, response) in enumerate(zip(test.output_channels, responses, strict=True)):
         if not np.ptp(response):
-            faults.append((output, f"{channel.column} {STANDS_STILL} {response[0]:.4g}"))
+            faults.append((output, f"{channel.column} {STANDS_STILL} {response[0]:z.4g}"))
             continue
         if is_clipped(response):
             faults.append((output, f"overload of {channel.column}"))
