@@ -1,4 +1,4 @@
-"""What `pipelines/stability.py` expects of fits to overlapping data is what estimates from such data differ by."""
+"""What `pipelines/pole_changes.py` expects of fits to overlapping data is what estimates from such data differ by."""
 
 import importlib.util
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 
 import frf_ipz
 
-SCRIPT = Path(__file__).parents[2] / "pipelines" / "stability.py"
+SCRIPT = Path(__file__).parents[2] / "pipelines" / "pole_changes.py"
 POLE, RESIDUES = -8.0 + 2j * np.pi * 100.0, np.array([[1.0, 0.5j, 2.0]])
 BAND = (80.0, 130.0)
 TRIALS = 1000
@@ -18,7 +18,7 @@ SCATTER = 0.1  # of a variance that so many trials tell: three times its deviati
 
 @pytest.fixture(scope="module")
 def script():
-    specification = importlib.util.spec_from_file_location("stability", SCRIPT)
+    specification = importlib.util.spec_from_file_location("pole_changes", SCRIPT)
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)
     return module
