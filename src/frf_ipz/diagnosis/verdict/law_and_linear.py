@@ -72,10 +72,12 @@ def search_beside_linear(
     if _is_force_alone(alone):
         return None
     null = linear.null
-    ranking = linear.ranking if linear.ranking.fits else search_component(problem, null)
+    is_strained = alone.nuisance_chi2 >= MAX_NUISANCE_CHI2
+    good_cost = np.inf if is_strained else 0.0  # where it is not, only what explains most of all counts
+    ranking = linear.ranking if linear.ranking.fits else search_component(problem, null, good_cost=good_cost)
     best = ranking.best
     is_most = best.cost <= MAX_COST_LEFT * null.cost
-    if best is null or not (is_most or alone.nuisance_chi2 >= MAX_NUISANCE_CHI2) or not is_significant(best, -1):
+    if best is null or not (is_most or is_strained) or not is_significant(best, -1):
         return None
     if (
         log_bayes_factor(best, null) < required_log_bayes_factor(problem, assess_goodness(problem, null))

@@ -121,7 +121,7 @@ def test_where_all_are_far_off_what_stands_out_beside_the_nuisance_is_tried(nomi
     problem = problem_with(
         nominal, ("attached_resonator", "added_mass"), [("attached_resonator", 12)], [4e-3, 120.0, 0.01]
     )
-    monkeypatch.setattr(searching, "_fit_starts", lambda *_: {})
+    monkeypatch.setattr(searching, "_fit_starts", lambda *_: True)
     monkeypatch.setattr(searching, "search_neighbourhoods", lambda *_: None)
     best = search_component(problem, fit_null_model(problem)).best
     assert best.hypothesis.components[-1].effect.name == "attached_resonator"

@@ -197,7 +197,7 @@ def test_where_no_start_fits_its_surroundings_are_tried(nominal, monkeypatch):
     start = Start(component=Component(effect=effect, location=wrong, n_locations=100), values=np.array([2e4]), cost=1.0)
     monkeypatch.setattr(search, "refine_halfway", lambda _bench, starts: starts)
     fits = {}
-    search._fit_starts(problem, fit_null_model(problem), [start], fits)
+    search._fit_starts(problem, fit_null_model(problem), [start], np.inf, fits)
     best = max(fits.values(), key=lambda fit: fit.log_evidence)
     assert best.hypothesis.components[-1].location.nodes == (6, 13)
 

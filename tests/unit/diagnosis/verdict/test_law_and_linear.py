@@ -144,6 +144,24 @@ def test_an_effect_that_leaves_half_is_not_tried_beside_a_law_that_strains_nothi
     assert laws.given == []
 
 
+@pytest.mark.parametrize(("nuisance_chi2", "good_cost"), [(5.0, 0.0), (50.0, np.inf)])
+def test_beside_a_law_that_strains_nothing_only_what_explains_most_is_searched_for(
+    monkeypatch, nuisance_chi2, good_cost
+):
+    asked, null = [], SimpleNamespace(cost=100.0)
+
+    def search(_problem, base, **options):
+        asked.append(options)
+        return SimpleNamespace(best=base)
+
+    monkeypatch.setattr(law_beside, "search_component", search)
+    monkeypatch.setattr(law_beside, "is_significant", lambda *_: False)
+    alone = SimpleNamespace(unknown_force=None, nuisance_chi2=nuisance_chi2)
+    decision = SimpleNamespace(null=null, ranking=SimpleNamespace(fits=()))
+    assert search_beside_linear(None, decision, alone, None, None, None) is None
+    assert asked == [{"good_cost": good_cost}]
+
+
 @pytest.mark.parametrize(
     ("verdict", "linear_first", "searches"),
     [("unexplained", False, ["linear", "law"]), ("unexplained", True, ["linear"]), ("explained", False, ["law"])],
