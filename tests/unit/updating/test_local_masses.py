@@ -92,6 +92,18 @@ def test_an_update_with_masses_is_made_only_where_the_one_without_them_promises_
     assert [bool(count) for count in made] == [False, True][:n_updates]
 
 
+def test_parameters_are_left_out_without_copies_of_matrices(beam):
+    """Masses of sensors come after those at nodes: none of the two changes the stiffness."""
+    frfs = frf_ipz.FrfSet.from_arrays(LINES, np.ones((len(LINES), 3, 1)), outputs=OUTPUTS, inputs=[FORCE])
+    basis = make_structural_basis(beam, frf_ipz.reduce_model(frfs, beam), sensors=OUTPUTS)
+    for left_out in (list(basis.at_nodes), list(basis.attached[:1]), [*basis.at_nodes, basis.attached[1]]):
+        fewer = basis.without(left_out)
+        stays = np.delete(np.arange(len(basis.names)), left_out)
+        assert np.shares_memory(fewer.stiffness, basis.stiffness)
+        for name in ("mass", "damping", "stiffness"):
+            assert np.array_equal(getattr(fewer, name), getattr(basis, name)[stays])
+
+
 def test_one_of_many_masses_of_nothing_is_hardly_ever_named(beam):
     reduced = frf_ipz.reduce_model(
         frf_ipz.FrfSet.from_arrays(LINES, np.ones((len(LINES), 3, 1)), outputs=OUTPUTS, inputs=[FORCE]), beam
