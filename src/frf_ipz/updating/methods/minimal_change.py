@@ -116,9 +116,11 @@ class _Update:
 
     @cached_property
     def local_masses(self) -> pd.DataFrame:
+        basis = self.posterior.stiffness.basis
+        if not basis.at_nodes:
+            return find_local_masses(basis, np.zeros((0, len(basis.names))))
         drawn = draw_whitened(self.posterior, np.random.default_rng(SEED), LEAST_DRAWS)
-        draws = parameters_of(self.posterior, drawn)
-        return find_local_masses(self.posterior.stiffness.basis, draws)
+        return find_local_masses(basis, parameters_of(self.posterior, drawn))
 
     @cached_property
     def log_evidence(self) -> float:
