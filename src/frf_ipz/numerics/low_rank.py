@@ -36,6 +36,8 @@ class LowRankMatrices:
         Those of the others that are not zero.
     starts : (k,) int array
         Where the vectors of each of these begin.
+    joined : (k, r, r) array
+        The same matrices as they are.
     whole : (w, r, r) array
         Those whose vectors would be more than half as many as their rows.
     whole_owners : (w,) int array
@@ -52,6 +54,7 @@ class LowRankMatrices:
     weights: FloatArray
     owners: IntArray
     starts: IntArray
+    joined: FloatArray
     whole: FloatArray
     whole_owners: IntArray
     count: int
@@ -87,6 +90,27 @@ class LowRankMatrices:
         turned = np.flatnonzero(np.any(left.imag, axis=0) & np.any(right.imag, axis=0))
         if len(turned):
             self._add(result, turned, left.imag[:, turned], right.imag[:, turned], -1.0)
+
+    def add_sums(self, result: FloatArray, amounts: FloatArray) -> None:
+        """Add sums of the matrices, each times an amount, to a result.
+
+        Parameters
+        ----------
+        result : (..., r, r) array
+            What they are added to.
+        amounts : (..., p) array
+            Of every matrix.
+        """
+        order = result.shape[-1]
+        is_beside = self.rows != self.columns
+        at = np.concatenate([self.rows * order + self.columns, (self.columns * order + self.rows)[is_beside]])
+        owners = np.concatenate([self.entry_owners, self.entry_owners[is_beside]])
+        entries = np.concatenate([self.entries, self.entries[is_beside]])
+        by_amount = sparse.csr_array((entries, (at, owners)), shape=(order**2, self.count))
+        result += (by_amount @ amounts.reshape(-1, self.count).T).T.reshape(result.shape)
+        for places, matrices in ((self.owners, self.joined), (self.whole_owners, self.whole)):
+            if len(places):
+                result += np.tensordot(amounts[..., places], matrices, 1)
 
     def _add(
         self, result: FloatArray, pairs: slice | IntArray, left: FloatArray, right: FloatArray, sign: float
@@ -153,19 +177,22 @@ def of_entries(rows: IntArray, columns: IntArray) -> LowRankMatrices:
         weights=np.zeros(0),
         owners=nothing,
         starts=nothing,
+        joined=np.zeros((0, 0, 0)),
         whole=np.zeros((0, 0, 0)),
         whole_owners=nothing,
         count=len(rows),
     )
 
 
-def factorise(matrices: FloatArray) -> LowRankMatrices:
+def factorise(matrices: FloatArray, turn: FloatArray | None = None) -> LowRankMatrices:
     """Find the entries or vectors of matrices that have few.
 
     Parameters
     ----------
     matrices : (p, r, r) array
         Symmetric.
+    turn : (r, r) array, optional
+        Coordinates T in which they are wanted, ``T^T A T``; their own by default.
 
     Returns
     -------
@@ -182,9 +209,13 @@ def factorise(matrices: FloatArray) -> LowRankMatrices:
     of_one: list[int] = []
     at_row: list[int] = []
     at_column: list[int] = []
+    entries: list[float] = []
     vectors, weights, owners, starts, used = [], [], [], [], 0
+    joined_matrices: list[FloatArray] = []
     whole_owners: list[int] = []
-    for number, matrix in enumerate(matrices):
+    whole_matrices: list[FloatArray] = []
+    for number, own in enumerate(matrices):
+        matrix = own if turn is None or not own.any() else turn.T @ own @ turn
         size = np.abs(matrix).max(axis=1, initial=0.0)
         rows = np.flatnonzero(size > ROUNDING * size.max(initial=0.0))
         if not len(rows):
@@ -195,30 +226,34 @@ def factorise(matrices: FloatArray) -> LowRankMatrices:
             of_one.append(number)
             at_row.append(int(rows[upper[0, 0]]))
             at_column.append(int(rows[upper[0, 1]]))
+            entries.append(float(matrix[at_row[-1], at_column[-1]]))
             continue
         values, directions = np.linalg.eigh(small)
         kept = np.abs(values) > ROUNDING * np.abs(values).max()
         if 2 * kept.sum() > order:
             whole_owners.append(number)
+            whole_matrices.append(matrix)
             continue
         whole = np.zeros((order, int(kept.sum())))
         whole[rows] = directions[:, kept]
         vectors.append(whole)
         weights.append(values[kept])
         owners.append(number)
+        joined_matrices.append(matrix)
         starts.append(used)
         used += whole.shape[1]
     joined = np.hstack(vectors) if vectors else np.zeros((order, 0))
     return LowRankMatrices(
         rows=np.array(at_row, np.int64),
         columns=np.array(at_column, np.int64),
-        entries=np.array([matrices[place] for place in zip(of_one, at_row, at_column, strict=True)], float),
+        entries=np.array(entries, float),
         entry_owners=np.array(of_one, np.int64),
         vectors=sparse.csr_array(joined) if np.count_nonzero(joined) < SPARSE * joined.size else joined,
         weights=np.concatenate(weights) if weights else np.zeros(0),
         owners=np.array(owners, np.int64),
         starts=np.array(starts, np.int64),
-        whole=matrices[whole_owners],
+        joined=np.reshape(joined_matrices, (len(owners), order, order)),
+        whole=np.reshape(whole_matrices, (len(whole_owners), order, order)),
         whole_owners=np.array(whole_owners, np.int64),
         count=len(matrices),
     )

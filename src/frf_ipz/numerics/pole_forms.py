@@ -187,10 +187,14 @@ def undamped_form(mass: FloatArray, stiffness: FloatArray) -> PoleForm:
         Of squared frequencies.
     """
     poles = undamped_poles(mass, stiffness)
+    return _undamped_form(mass, stiffness, poles.values.real, poles.right_vectors.real)
+
+
+def _undamped_form(mass: FloatArray, stiffness: FloatArray, squares: FloatArray, shapes: FloatArray) -> PoleForm:
     return PoleForm(
-        poles=poles.values.real,
-        shapes=poles.right_vectors.real,
-        slope=np.ones(len(poles.values)),
+        poles=squares,
+        shapes=shapes,
+        slope=np.ones(len(squares)),
         rigid=np.zeros((len(mass), 0)),
         mass=mass,
         damping=None,
@@ -224,16 +228,28 @@ def damped_form(
     elastic, rates = np.flatnonzero(~free), rates[np.ix_(~free, ~free)]
     upper, vectors, _ = damped_modes(squares[elastic], rates)
     slope = 2 * upper * np.sum(vectors**2, axis=0) + np.sum(vectors * (rates @ vectors), axis=0)
+    return _closed_form((mass, damping, stiffness), upper, shapes[:, elastic] @ vectors, slope, shapes[:, free])
+
+
+def _closed_form(
+    matrices: tuple[FloatArray, FloatArray, FloatArray],
+    upper: ComplexArray,
+    vectors: ComplexArray,
+    slope: ComplexArray,
+    rigid: FloatArray,
+) -> PoleForm:
+    """Join poles of the upper half plane, and real ones, with the conjugates of the former."""
     oscillates = upper.imag > 0
 
     def closed(numbers: ComplexArray) -> ComplexArray:
         return np.concatenate([numbers, numbers[..., oscillates].conj()], axis=-1)
 
+    mass, damping, stiffness = matrices
     return PoleForm(
         poles=closed(upper),
-        shapes=closed(shapes[:, elastic] @ vectors),
+        shapes=closed(vectors),
         slope=closed(slope),
-        rigid=shapes[:, free],
+        rigid=rigid,
         mass=mass,
         damping=damping,
         stiffness=stiffness,
@@ -351,6 +367,39 @@ class DampedModel:
             return None
         undamped = undamped_form(mass, stiffness)
         return cls(undamped=undamped, damped=damped_form(mass, damping, stiffness, undamped=undamped))
+
+    @classmethod
+    def of_roots(
+        cls,
+        matrices: tuple[FloatArray, FloatArray, FloatArray],
+        modes: tuple[FloatArray, FloatArray],
+        roots: tuple[ComplexArray, ComplexArray],
+    ) -> DampedModel | None:
+        """Express a model by poles that are known.
+
+        Parameters
+        ----------
+        matrices : tuple of (r, r) array
+            Mass, positive definite, damping, and stiffness.
+        modes : pair of (r,) and (r, r) array
+            Squared natural frequencies without damping, (rad/s)^2, and mass-normalised shapes.
+        roots : pair of (k,) and (r, k) array
+            Poles without conjugates, rad/s, and their vectors.
+
+        Returns
+        -------
+        DampedModel or None
+            None where the matrices are not symmetric. One with rigid-body modes is expressed by the matrices alone.
+        """
+        mass, damping, stiffness = matrices
+        (squares, shapes), (poles, vectors) = modes, roots
+        if not are_symmetric(*matrices) or squares.min(initial=np.inf) <= RIGID * squares.max(initial=0.0):
+            return cls.of(*matrices)
+        slope = np.sum(vectors * (2 * poles * _times(mass, vectors) + _times(damping, vectors)), axis=0)
+        return cls(
+            undamped=_undamped_form(mass, stiffness, squares, shapes),
+            damped=_closed_form(matrices, poles, vectors, slope, np.zeros((len(mass), 0))),
+        )
 
     def every_zero(self, outputs: FloatArray, inputs: FloatArray) -> list[Roots]:
         """All zeros of several FRFs, those with an imaginary part of at least 0.

@@ -11,6 +11,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.numerics.damped_modes import receptance_roots, softly_held
 from frf_ipz.numerics.pencils import modes_of_stack
+from frf_ipz.numerics.pole_forms import DampedModel
 from frf_ipz.numerics.pole_sums import PoleSums
 
 if TYPE_CHECKING:
@@ -36,15 +37,38 @@ class ModelEnsemble:
     lowest_rad_s: float
 
     @cached_property
+    def _free_modes(self) -> tuple[FloatArray, FloatArray]:
+        return modes_of_stack(self.matrices[:, 0], self.matrices[:, 2])
+
+    @cached_property
     def modes(self) -> tuple[FloatArray, FloatArray]:
         """Squared natural frequencies (m, r), ascending, and mass-normalised shapes (m, r, r)."""
-        squares, shapes = modes_of_stack(self.matrices[:, 0], self.matrices[:, 2])
+        squares, shapes = self._free_modes
         return softly_held(squares, self.lowest_rad_s), shapes
 
     @cached_property
     def roots(self) -> list[tuple[ComplexArray, ComplexArray, ComplexArray]]:
         """Of each member k poles, and right and left vectors (r, k) whose products are the residues."""
         return [receptance_roots(*member) for member in zip(*self.modes, self.matrices[:, 1], strict=True)]
+
+    def by_poles(self, member: int) -> DampedModel | None:
+        """Express a member by its poles, those of `roots` where none of its modes is softly held.
+
+        Parameters
+        ----------
+        member : int
+            Which one.
+
+        Returns
+        -------
+        DampedModel or None
+            None where its matrices are not symmetric.
+        """
+        mass, damping, stiffness = self.matrices[member]
+        squares, shapes = self._free_modes[0][member], self._free_modes[1][member]
+        if not np.array_equal(squares, self.modes[0][member]):
+            return DampedModel.of(mass, damping, stiffness)
+        return DampedModel.of_roots((mass, damping, stiffness), (squares, shapes), self.roots[member][:2])
 
     def receptance(self, output: FloatArray, force: FloatArray, s: ComplexArray) -> ComplexArray:
         """Evaluate one FRF of every member.

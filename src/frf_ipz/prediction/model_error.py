@@ -96,27 +96,25 @@ def estimate_model_error(fit: ModalFit, updated: UpdatedModel, ensemble: ModelEn
     powers = np.array([label.quantity.power for label in fit.labels])
     gains, sizes = scale.gains(fit.labels), frf_sizes(updated, fit.labels, s, centre)
     values = {(lines.start, frfs.start): block[0] for lines, frfs, block in centre.receptances(outputs, inputs, s)}
+    drawn = np.stack([scale.drawn_about_level(label, len(ensemble.matrices)) for label in fit.labels], axis=1)
+    noise = (_at(lines_hz, fit, fit.value_std) / gains) ** 2
+    not_fitted = np.zeros_like(noise) if fit.missed is None else (_at(lines_hz, fit, fit.missed) / gains) ** 2
     for lines, frfs, block in ensemble.receptances(outputs, inputs, s):
         factor = s[lines, None] ** powers[frfs]
-        block *= np.stack([scale.drawn_about_level(label, len(block)) for label in fit.labels[frfs]], axis=1)[:, None]
+        block *= drawn[:, None, frfs]
         block -= block.mean(axis=0)
         parts = block.view(float).reshape(*block.shape, 2)
         spread = np.einsum("mlfp,mlfp->lf", parts, parts) / len(block) * np.abs(factor) ** 2
-        std = [np.interp(lines_hz[lines], fit.frequency_hz, column) for column in fit.value_std[:, frfs].T]
-        noise = (np.stack(std, axis=1) / gains[frfs]) ** 2
         missed = measured[lines, frfs] - values[lines.start, frfs.start] * factor
-        excess = np.maximum(np.abs(missed) ** 2 - spread - noise, 0.0)
-        excess += _not_fitted(fit, lines_hz[lines], frfs) / gains[frfs] ** 2
+        excess = np.maximum(np.abs(missed) ** 2 - spread - noise[lines, frfs], 0.0) + not_fitted[lines, frfs]
         size = sizes[lines, frfs] ** 2
         power[lines] += np.divide(excess, size, out=np.zeros_like(size), where=size > 0.0).sum(axis=1)
     return ModelError(ratio=np.sqrt(power / len(fit.labels)), degrees=2 * _independent(fit.labels))
 
 
-def _not_fitted(fit: ModalFit, lines_hz: FloatArray, frfs: slice) -> FloatArray:
-    """Power of what the fit misses of the measured FRFs, (lines, frfs)."""
-    if fit.missed is None:
-        return np.zeros((1, 1))
-    return np.stack([np.interp(lines_hz, fit.frequency_hz, of_frf) for of_frf in fit.missed[:, frfs].T], axis=1) ** 2
+def _at(lines_hz: FloatArray, fit: ModalFit, values: FloatArray) -> FloatArray:
+    """Values of the fit's lines at others, (n_lines, n_frfs)."""
+    return np.stack([np.interp(lines_hz, fit.frequency_hz, of_frf) for of_frf in values.T], axis=1)
 
 
 def as_ensemble(updated: UpdatedModel, lowest_rad_s: float) -> ModelEnsemble:

@@ -105,7 +105,7 @@ def predict_frfs(
     band_rad_s = float(np.abs(s[0])), float(np.abs(s[-1]))
     ensemble = _ensemble(updated, s)
     low, high = _magnitude_bands(measured, updated, ensemble, predicted, s)
-    zeros, zero_std = predicted_zeros(updated.model, updated.ensemble, predicted, band_rad_s)
+    zeros, zero_std = predicted_zeros(updated.model, ensemble, predicted, band_rad_s)
     statement = updated.scale.statement if predicted else ""
     bands = wide_bands(frequency_hz, low, high)
     notes = explain_wide_bands(bands, updated.model, ensemble, labels, predicted, frequency_hz, zeros)
@@ -222,13 +222,13 @@ def _magnitude_bands(
         centre = as_ensemble(updated, ensemble.lowest_rad_s)
         sizes = frf_sizes(updated, labels, s, centre) if error is not None and labels else None
         gains, powers = np.abs(updated.scale.gains(tuple(labels))), np.array([label.quantity.power for label in labels])
+        drawn = [updated.scale.drawn(label, len(updated.ensemble)) for label in labels]
         for lines, frfs, block in _receptances(measured, updated, (ensemble, centre), labels, s):
             block *= s[lines, None] ** powers[frfs]
             if error is not None and sizes is not None:
                 block += error.draw(len(block))[:, None, None] * (error.ratio[lines, None] * sizes[lines, frfs])
-            drawn = [updated.scale.drawn(label, len(block)) for label in labels[frfs]]
             magnitude = np.abs(block)
-            magnitude *= (gains[frfs] * np.stack(drawn, axis=1))[:, None]
+            magnitude *= (gains[frfs] * np.stack(drawn[frfs], axis=1))[:, None]
             bands[:, lines, frfs] = _limits(magnitude)
     return bands[0], bands[1]
 

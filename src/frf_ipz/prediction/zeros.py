@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray
-from frf_ipz.numerics.pole_forms import DampedModel, every_damped_zero
+from frf_ipz.numerics.pole_forms import every_damped_zero
 from frf_ipz.pairing.model_roots import ModelZeros, model_zeros
 from frf_ipz.rational import ZeroSet
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.frf import FrfLabel
+    from frf_ipz.prediction.ensemble import ModelEnsemble
     from frf_ipz.structure import ReducedModel
 
 MAX_MEMBERS = 100  # of the ensemble: enough for a standard deviation
@@ -27,7 +28,7 @@ GAUSSIAN = 0.6745  # median absolute deviation over standard deviation
 
 
 def predicted_zeros(
-    model: ReducedModel, ensemble: FloatArray, labels: Sequence[FrfLabel], band_rad_s: tuple[float, float]
+    model: ReducedModel, ensemble: ModelEnsemble, labels: Sequence[FrfLabel], band_rad_s: tuple[float, float]
 ) -> tuple[ZeroSet, FloatArray]:
     """Zeros of FRFs of an updated model in a band.
 
@@ -35,7 +36,7 @@ def predicted_zeros(
     ----------
     model : ReducedModel
         The updated model.
-    ensemble : (m, 3, r, r) array
+    ensemble : ModelEnsemble
         Models drawn from what targets and prior leave open.
     labels : sequence of FrfLabel
         The FRFs.
@@ -54,7 +55,7 @@ def predicted_zeros(
     kinds: list[str] = []
     spread: list[tuple[float, float, float]] = []
     found = [_Inside.of(zeros, band_rad_s) for zeros in model_zeros(model, labels)]
-    nearest = _nearest_of_members(model, ensemble[:MAX_MEMBERS], labels, found)
+    nearest = _nearest_of_members(model, ensemble, labels, found)
     for number, (inside, of_members) in enumerate(zip(found, nearest, strict=True)):
         values += inside.values.tolist()
         kinds += inside.kinds
@@ -97,20 +98,21 @@ class _Inside:
 
 
 def _nearest_of_members(
-    model: ReducedModel, ensemble: FloatArray, labels: Sequence[FrfLabel], found: Sequence[_Inside]
+    model: ReducedModel, ensemble: ModelEnsemble, labels: Sequence[FrfLabel], found: Sequence[_Inside]
 ) -> list[ComplexArray]:
     """Zeros of each member nearest to those of the model, (m, n) of every FRF; NaN where a member has none."""
     outputs = np.array([model.row(label.output_dof) for label in labels])
     inputs = np.array([model.row(label.input_dof) for label in labels])
-    nearest = [np.full((len(ensemble), len(inside.values)), complex(np.nan, np.nan)) for inside in found]
+    members = ensemble.matrices[:MAX_MEMBERS]
+    nearest = [np.full((len(members), len(inside.values)), complex(np.nan, np.nan)) for inside in found]
     start = np.concatenate([*(inside.values for inside in found), np.zeros(0, complex)])
     gaps = np.concatenate([*(inside.gaps for inside in found), np.zeros(0)])
     frf = np.repeat(np.arange(len(found)), [len(inside.values) for inside in found])
     if not len(start):
         return nearest
-    for member, (mass, damping, stiffness) in enumerate(ensemble):
+    for member, (mass, damping, stiffness) in enumerate(members):
         is_near, zeros = np.zeros(len(start), bool), start
-        by_poles = DampedModel.of(mass, damping, stiffness)
+        by_poles = ensemble.by_poles(member)
         if by_poles is not None:
             zeros, is_found = by_poles.damped.zeros(outputs[frf], inputs[frf], start)
             is_near = is_found & (np.abs(zeros - start) < HALFWAY * gaps)

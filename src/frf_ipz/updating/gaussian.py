@@ -20,6 +20,8 @@ is formed for these only, and the search for the slack costs what the parameters
 Zeros of many FRFs say little more than the shapes of a few modes do, so most combinations of parameters are moved by no
 datum. Those of which the data say less than `UNTOLD` of what the prior says are left out, by a Cholesky factor with
 pivots of the information (LAPACK's ``pstrf``), and keep their prior.
+
+[Nocedal2006]: J. Nocedal, S. J. Wright, Numerical Optimization, 2nd ed., Springer 2006, doi:10.1007/978-0-387-40065-5.
 """
 
 from __future__ import annotations
@@ -47,7 +49,8 @@ MAX_DEVIATION = 6.0  # standard deviations of a scale's prior within which the s
 LARGEST_SCALE_STEP = 2.0  # of the logarithm of a scale in one step
 FLAT = 1e-4  # of the logarithm of the evidence: what a further step would gain is nothing (1e-2 moves printed digits)
 MAX_HALVINGS = 10
-CONTRACTING = 0.25  # of the gain of the step before: beyond it a curvature from farther away costs steps
+FAR = 1.0  # of the logarithm of the evidence: a step that gains more ends where the curvature is another one
+LEAST_SHARE = 0.1  # of a step that was too long
 ROWS_AT_ONCE = 4096
 DRAWS_OF_A_SCALE = 4  # of parameters, on average, for each draw of their terms' standard deviations
 ROWS_OF_A_TILE = 128  # when a matrix is mirrored: both tiles stay in the cache
@@ -311,7 +314,7 @@ class Linearised:
         self.sums.append((weights, total))
         return total.copy()
 
-    def information(self, scales: FloatArray, factor: float) -> tuple[FloatArray, FloatArray]:
+    def information(self, scales: FloatArray, factor: float) -> tuple[FloatArray, FloatArray, float]:
         """Give the information of shared errors and parameters, with that of their prior.
 
         Parameters
@@ -327,6 +330,8 @@ class Linearised:
             Its upper Cholesky factor.
         right : (c + k,) array
             Weighted data.
+        square : float
+            Sum of the weighted squares of the data: with the same weights, which a mixture has to `ALIKE` only.
         """
         products = self.products(1 / (self.level + factor**2), scales)
         information = products[:-1, :-1].copy()
@@ -335,7 +340,7 @@ class Linearised:
         root, info = lapack.dpotrf(information.T, lower=0, clean=1, overwrite_a=1)
         if info:
             raise np.linalg.LinAlgError(INDEFINITE)
-        return np.asarray(root), products[:-1, -1]
+        return np.asarray(root), products[:-1, -1], float(products[-1, -1])
 
 
 def linearise(
@@ -529,7 +534,7 @@ def solve_step(linear: Linearised, scales: FloatArray, factor: float = 0.0) -> G
     GaussianStep
         The posterior.
     """
-    root, right = linear.information(scales, factor)
+    root, right, _ = linear.information(scales, factor)
     n_common = linear.ends[0]
     mean = cho_solve((root, False), right, check_finite=False)[n_common:]
     inverse_root = lapack.dtrtri(root)[0][n_common:]
@@ -675,7 +680,7 @@ class _InverseCovariance:
 
     @classmethod
     def of(cls, linear: Linearised, scales: FloatArray) -> _InverseCovariance:
-        root, right = linear.information(scales, 0.0)
+        root, right, _ = linear.information(scales, 0.0)
         mean = cho_solve((root, False), right, check_finite=False)
         weights, factors = 1 / linear.level, linear.factors(scales)
         columns = linear.joined[:, : linear.ends[-1]]
@@ -800,7 +805,8 @@ def _drawn_scales(
 def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: FloatArray) -> FloatArray:
     """Find the standard deviations of the prior terms under which the data are most likely.
 
-    Fisher's scoring on their logarithms: the expected curvature of the evidence comes with its slope.
+    Quasi-Newton steps of their logarithms that begin with the expected curvature of the evidence. Alone, as in Fisher's
+    scoring, that leads there slowly: what it says of the slack may be off by far.
 
     Parameters
     ----------
@@ -823,32 +829,49 @@ def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: Fl
     search = _ScaleSearch(linear, terms, free, start)
     logs = np.clip(np.log(start)[free], search.low, search.high)
     evidence = search.evidence(logs)
-    curvature, gain_before = None, 0.0
+    curvature = evidence.curvature()
     for _ in range(MAX_SCALE_STEPS):
-        slope = evidence.slope
-        if curvature is not None:
-            step = search.step(logs, slope, curvature)
-            if -0.5 * float(slope @ step) > CONTRACTING * gain_before:
-                curvature = None
-        if curvature is None:
-            curvature = evidence.curvature()
-            step = search.step(logs, slope, curvature)
-        gain = gain_before = -0.5 * float(slope @ step)
-        if gain < FLAT:
+        step = search.step(logs, evidence.slope, curvature)
+        if -0.5 * float(evidence.slope @ step) < FLAT:
             logs = np.clip(logs + step, search.low, search.high)
             break
-        for _ in range(MAX_HALVINGS):
-            tried = np.clip(logs + step, search.low, search.high)
-            new = search.try_evidence(tried)
-            if new is not None and new.value <= evidence.value:
-                break
-            step /= 2
-        else:
+        found = _better_scales(search, logs, evidence, step)
+        if found is None:
             break
-        logs, evidence = tried, new
+        moved, change, gain = found[0] - logs, found[1].slope - evidence.slope, evidence.value - found[1].value
+        logs, evidence = found
+        curvature = _curvature_seen(evidence.curvature() if gain > FAR else curvature, moved, change)
     scales = start.copy()
     scales[free] = np.exp(logs)
     return scales
+
+
+def _better_scales(
+    search: _ScaleSearch, logs: FloatArray, evidence: _Evidence, step: FloatArray
+) -> tuple[FloatArray, _Evidence] | None:
+    """Shorten a step until the data are likelier: to the top of the parabola through what is known of it."""
+    for _ in range(MAX_HALVINGS):
+        tried = np.clip(logs + step, search.low, search.high)
+        new = search.try_evidence(tried)
+        if new is not None and new.value <= evidence.value:
+            return tried, new
+        rise = float(evidence.slope @ step)
+        above = np.inf if new is None else new.value - evidence.value - rise
+        step = step * np.clip(-rise / (2 * above), LEAST_SHARE, 0.5)
+    return None
+
+
+def _curvature_seen(curvature: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:
+    """Correct a curvature by the change of the slope over a step: the BFGS formula, eq. (6.19) of [Nocedal2006].
+
+    Left as it is where that leaves no curvature of a valley, as where the slope is rounding.
+    """
+    told, before = float(step @ change), curvature @ step
+    if told <= 0.0:
+        return curvature
+    corrected = curvature - np.outer(before, before) / float(step @ before) + np.outer(change, change) / told
+    values = np.linalg.eigvalsh(corrected)
+    return np.asarray(corrected if values[0] > len(values) * np.finfo(float).eps * values[-1] else curvature)
 
 
 def log_evidence(linear: Linearised, terms: Sequence[PriorTerm], scales: FloatArray) -> float:
@@ -897,7 +920,7 @@ def gain_of_further_terms(linear: Linearised, further: FloatArray, scales: Float
     """
     further = linear.rotated(further)
     weighted = further / (linear.level + factor**2)[:, None]
-    root, right = linear.information(scales, factor)
+    root, right, _ = linear.information(scales, factor)
     beside = linear.factors(scales)[:, None] * (linear.joined[:, : linear.ends[-1]].T @ weighted)
     solved = cho_solve((root, False), np.column_stack([beside, right]), check_finite=False)
     told = further.T @ weighted - beside.T @ solved[:, :-1]
@@ -968,10 +991,10 @@ class _ScaleSearch:
         linear, count = self.linear, len(self.linear.bases)
         has_slack = len(self.terms) > count
         factor = float(scales[-1]) if has_slack else self.held
-        root, right = linear.information(scales[:count], factor)
+        root, right, square = linear.information(scales[:count], factor)
         mean = cho_solve((root, False), right, check_finite=False)
         weights = 1 / (linear.level + factor**2)
-        value = 0.5 * float(weights @ linear.data**2 - right @ mean) + float(np.log(np.diagonal(root)).sum())
+        value = 0.5 * (square - float(right @ mean)) + float(np.log(np.diagonal(root)).sum())
         deviation = (logs - self._center) / self._spread
         value += 0.5 * float(deviation @ deviation) - 0.5 * float(np.log(weights).sum())
         return _Evidence(

@@ -197,17 +197,14 @@ class ParameterBasis(Concise):
             Without them.
         """
         stays = ~np.isin(np.arange(len(self.names)), places)
-        kept = np.flatnonzero(stays)
-        is_run = len(kept) > 0 and kept[-1] - kept[0] + 1 == len(kept)
-        rows = slice(kept[0], kept[-1] + 1) if is_run else kept  # of a run, matrices need no copy
         numbers = np.cumsum(stays) - 1
         terms = [replace(term, root=term.root[stays]) for term in self.terms]
         return replace(
             self,
             names=tuple(name for name, is_kept in zip(self.names, stays, strict=True) if is_kept),
-            mass=self.mass[rows],
-            damping=self.damping[rows],
-            stiffness=self.stiffness[rows],
+            mass=_kept(self.mass, stays),
+            damping=_kept(self.damping, stays),
+            stiffness=_kept(self.stiffness, stays),
             logarithmic=self.logarithmic[stays],
             terms=tuple(replace(term, root=term.root[:, term.root.any(axis=0)]) for term in terms if term.root.any()),
             attached=tuple(int(numbers[place]) for place in self.attached if stays[place]),
@@ -379,11 +376,26 @@ def join_bases(first: ParameterBasis, second: ParameterBasis) -> ParameterBasis:
 
 
 def _stacked(first: FloatArray, second: FloatArray) -> FloatArray:
-    """One after the other; matrices that are zero take no memory, as nothing is written into them."""
-    result = np.zeros((len(first) + len(second), *first.shape[1:]))
-    for part, matrices in ((slice(len(first)), first), (slice(len(first), None), second)):
-        if np.any(matrices):
-            result[part] = matrices
+    """One after the other."""
+    return _copied([*first, *second], first.shape[1:])
+
+
+def _kept(matrices: FloatArray, stays: BoolArray) -> FloatArray:
+    """Those that stay: without a copy where they are a run, or nothing but zeros from the first that is left out on."""
+    places = np.flatnonzero(stays)
+    first = int(places[0]) if len(places) else 0
+    is_run = bool(stays[first : first + len(places)].all())
+    if is_run or not matrices[int(np.argmin(stays)) :].any():
+        return matrices[first if is_run else 0 :][: len(places)]
+    return _copied([matrices[place] for place in places], matrices.shape[1:])
+
+
+def _copied(matrices: Sequence[FloatArray], shape: tuple[int, ...]) -> FloatArray:
+    """Give a stack of matrices; those that are zero take no memory, as nothing is written into them."""
+    result = np.zeros((len(matrices), *shape))
+    for copy, matrix in zip(result, matrices, strict=True):
+        if np.any(matrix):
+            copy[:] = matrix
     return result
 
 

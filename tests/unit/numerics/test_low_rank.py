@@ -55,6 +55,22 @@ def test_forms_are_added_to_what_is_there(symmetric):
     assert np.abs(total).max() < 1e-12
 
 
+def test_sums_are_those_of_the_matrices(symmetric):
+    """Also of two matrices with their entry at one place, in other coordinates, and for many amounts at once."""
+    rng = np.random.default_rng(3)
+    stack = np.concatenate([symmetric, 2.0 * symmetric[-1:], np.diag(np.eye(ORDER)[2])[None]])
+    amounts = rng.standard_normal((4, len(stack)))
+    for turn in (None, rng.standard_normal((ORDER, ORDER))):
+        turned = stack if turn is None else turn.T @ stack @ turn
+        total = np.ones((4, ORDER, ORDER))
+        factorise(stack, turn).add_sums(total, amounts)
+        expected = 1.0 + np.tensordot(amounts, turned, 1)
+        assert np.abs(total - expected).max() < 1e-9 * np.abs(expected).max()
+        alone = np.zeros((ORDER, ORDER))
+        factorise(stack, turn).add_sums(alone, amounts[0])
+        assert np.abs(alone + 1.0 - expected[0]).max() < 1e-9 * np.abs(expected).max()
+
+
 def test_no_matrices_have_no_forms():
     assert factorise(np.zeros((2, 3, 3))).forms(np.eye(3), np.eye(3)).tolist() == [[0.0, 0.0]] * 3
     assert factorise(np.zeros((0, 3, 3))).forms(np.eye(3), np.eye(3)).shape == (3, 0)

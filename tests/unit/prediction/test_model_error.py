@@ -7,6 +7,8 @@ import pytest
 
 import frf_ipz
 from clamped_beam import BEAM
+from frf_ipz.prediction import ensemble
+from frf_ipz.updating.scale import MeasuredScale
 
 LINES = np.arange(5.0, 700.0, 0.5)
 OUTPUTS, INPUTS, POINT = ("9:+z", "16:+z", "21:+z"), ("12:+z",), "18:+z"
@@ -102,3 +104,23 @@ def test_a_band_is_wide_where_the_fit_misses_what_was_measured():
     widths = [10 * np.log10(each.magnitude_high / each.magnitude_low)[:, 0] for each in (as_fitted, as_seen)]
     assert widths[1][peak] > 5.0
     assert np.allclose(np.delete(widths[0], [peak]), np.delete(widths[1], [peak]), rtol=1e-9, atol=0)
+
+
+def test_gains_are_drawn_no_more_often_where_lines_come_in_more_pieces(monkeypatch):
+    drawn = []
+    draw = MeasuredScale.drawn_about_level
+
+    def noted(*given):
+        drawn.append(given)
+        return draw(*given)
+
+    monkeypatch.setattr(MeasuredScale, "drawn_about_level", noted)
+    counts, bands = [], []
+    for values_at_once in (ensemble.VALUES_AT_ONCE, 512):
+        monkeypatch.setattr(ensemble, "VALUES_AT_ONCE", values_at_once)
+        drawn.clear()
+        prediction, _, _ = predict(frf_ipz.make_beam(**{**BEAM, "youngs_modulus_Pa": 71e9}))
+        counts.append(len(drawn))
+        bands.append(prediction.magnitude_high)
+    assert counts[0] == counts[1]
+    np.testing.assert_allclose(bands[1], bands[0], rtol=1e-9)

@@ -322,12 +322,38 @@ def test_sums_over_the_data_serve_for_every_slack(many):
     linear = linearise([sensitivity], data, noise, np.ones(len(data)))
     factors = np.random.default_rng(8).permutation(np.geomspace(0.3, 3.0, 30))  # a search goes to and fro
     for factor in factors:
-        root, right = linear.information(np.ones(1), float(factor))
+        root, right, square = linear.information(np.ones(1), float(factor))
         alone = linearise([sensitivity], data, noise, np.ones(len(data)))
-        expected, its_right = alone.information(np.ones(1), float(factor))
+        expected, its_right, its_square = alone.information(np.ones(1), float(factor))
         assert_allclose(root, expected, rtol=1e-3, atol=1e-3)
         assert_allclose(right, its_right, rtol=1e-3, atol=1e-3)
+        assert_allclose(square, its_square, rtol=1e-3)
     assert len(linear.sums) < len(factors) / 2
+
+
+def test_scales_and_slack_of_large_data_are_the_most_likely_ones():
+    """Parameters explain nearly all: what a mixture of sums is off by must not count as evidence."""
+    rng = np.random.default_rng(11)
+    parts = [rng.standard_normal((400, 12)), rng.standard_normal((400, 30))]
+    levels = np.geomspace(1e-6, 1e-2, 400)
+    data = parts[0] @ (1e3 * rng.standard_normal(12)) + parts[1] @ (100 * rng.standard_normal(30))
+    data += np.sqrt(levels + 0.02**2) * rng.standard_normal(400)
+    terms = [PriorTerm(name=str(k), root=np.eye(part.shape[1]), std=100.0) for k, part in enumerate(parts)]
+    terms.append(PriorTerm(name="slack", root=np.zeros((0, 0)), std=1.0, scale_uncertainty=3.0))
+    linear = linearise(parts, data, noise_of(np.diag(levels)), np.ones(400))
+    logs = np.log(most_likely_scales(linear, terms, np.array([100.0, 100.0, 1.0])))
+
+    def loss(logs):
+        variance = np.exp(2 * logs)
+        matrix = np.diag(levels + variance[2])
+        matrix += sum(size * part @ part.T for size, part in zip(variance, parts, strict=False))
+        deviations = [(x - np.log(term.std)) / term.scale_uncertainty for x, term in zip(logs, terms, strict=True)]
+        prior = np.sum(np.square(deviations)) / 2
+        root = np.linalg.cholesky(matrix)
+        return prior + np.sum(np.linalg.solve(root, data) ** 2) / 2 + np.log(np.diagonal(root)).sum()
+
+    for step in np.vstack([0.05 * np.eye(3), -0.05 * np.eye(3)]):
+        assert loss(logs + step) > loss(logs)
 
 
 def test_the_distance_to_the_optimum_is_in_posterior_deviations(problem):
@@ -379,7 +405,7 @@ def test_a_target_that_runs_off_leaves_the_others_their_information():
     others = TargetNoise(common=np.zeros((39, 0)), blocks=(1e-12 * np.eye(39),))
     data = sensitivity @ rng.standard_normal(60)
     linear = linearise([sensitivity], data, noise)
-    root, _ = linear.information(np.ones(1), 0.0)
+    root, _, _ = linear.information(np.ones(1), 0.0)
     assert np.isfinite(root).all()
     without = linearise([sensitivity[1:]], data[1:], others)
     assert not without.rounding.any()

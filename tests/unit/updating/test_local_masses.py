@@ -79,17 +79,35 @@ def test_a_sound_model_names_no_mass(beam):
 def test_an_update_with_masses_is_made_only_where_the_one_without_them_promises_one(
     beam, monkeypatch, mass_kg, n_updates
 ):
-    made = []
-    solve = minimal_change._solve_with_masses
+    made, drawn = [], []
+    solve, draw = minimal_change._solve_with_masses, minimal_change.draw_whitened
 
     def counted(problem, *further):
         made.append(len(problem.basis.at_nodes))
         return solve(problem, *further)
 
+    def noted(*given):
+        drawn.append(given)
+        return draw(*given)
+
     monkeypatch.setattr(minimal_change, "_solve_with_masses", counted)
+    monkeypatch.setattr(minimal_change, "draw_whitened", noted)
     masses = [frf_ipz.BeamPointMass(node=17, mass_kg=mass_kg)] if mass_kg else []
     updated_to(beam, frf_ipz.make_beam(**{**BEAM, "youngs_modulus_Pa": 71e9}, point_mass=masses))
     assert [bool(count) for count in made] == [False, True][:n_updates]
+    assert len(drawn) == n_updates - 1  # without masses at nodes there is none to be named
+
+
+def test_parameters_are_left_out_without_copies_of_matrices(beam):
+    """Masses of sensors come after those at nodes: none of the two changes the stiffness."""
+    frfs = frf_ipz.FrfSet.from_arrays(LINES, np.ones((len(LINES), 3, 1)), outputs=OUTPUTS, inputs=[FORCE])
+    basis = make_structural_basis(beam, frf_ipz.reduce_model(frfs, beam), sensors=OUTPUTS)
+    for left_out in (list(basis.at_nodes), list(basis.attached[:1]), [*basis.at_nodes, basis.attached[1]]):
+        fewer = basis.without(left_out)
+        stays = np.delete(np.arange(len(basis.names)), left_out)
+        assert np.shares_memory(fewer.stiffness, basis.stiffness)
+        for name in ("mass", "damping", "stiffness"):
+            assert np.array_equal(getattr(fewer, name), getattr(basis, name)[stays])
 
 
 def test_one_of_many_masses_of_nothing_is_hardly_ever_named(beam):

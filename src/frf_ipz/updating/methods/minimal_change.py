@@ -25,7 +25,7 @@ from frf_ipz.updating.local_masses import find_local_masses, local_mass_notes
 from frf_ipz.updating.minimal_change.damping import DampingPhase, damping_phase
 from frf_ipz.updating.minimal_change.ensemble import Posterior, draw_ensemble, draw_whitened, parameters_of
 from frf_ipz.updating.minimal_change.gauss_newton import PhaseResult, iterate, log_evidence_of
-from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, frame_of, modal_frame, modal_parameters
+from frf_ipz.updating.minimal_change.modal_frame import ModalFrame, frame_of, modal_frame
 from frf_ipz.updating.minimal_change.outliers import EXCLUDED_STD, contradicted_targets, unmet_targets
 from frf_ipz.updating.minimal_change.stiffness import StiffnessPhase, log_moduli
 from frf_ipz.updating.pairing_again import ROUNDS
@@ -104,7 +104,7 @@ class _Update:
 
     problem: UpdateProblem
     posterior: Posterior
-    history: tuple[tuple[str, PhaseResult], ...]
+    history: tuple[dict[str, str | float], ...]
     excluded: IntArray
     drawn: tuple[FloatArray, np.random.Generator] | None = None
 
@@ -116,9 +116,11 @@ class _Update:
 
     @cached_property
     def local_masses(self) -> pd.DataFrame:
+        basis = self.posterior.stiffness.basis
+        if not basis.at_nodes:
+            return find_local_masses(basis, np.zeros((0, len(basis.names))))
         drawn = draw_whitened(self.posterior, np.random.default_rng(SEED), LEAST_DRAWS)
-        draws = parameters_of(self.posterior, drawn)
-        return find_local_masses(self.posterior.stiffness.basis, draws)
+        return find_local_masses(basis, parameters_of(self.posterior, drawn))
 
     @cached_property
     def log_evidence(self) -> float:
@@ -229,7 +231,7 @@ def _solve(
     inner = modal_frame(*phase.matrices(result.theta))
     damping = _damping_phase(problem, frame, inner, phase, result, of_damping)
     damped = iterate(damping, damping.initial_roots(), start=damping.start())
-    history = [("stiffness", result), ("damping", damped)]
+    history = [*_rows("stiffness", result), *_rows("damping", damped)]
     shift = _change_by_damping(damped.tracked.values(len(stated)), result.tracked) - stated
     if np.any(np.abs(shift) > SHIFTED * np.sqrt(result.noise.variance)):
         phase = replace(phase, targets=phase.targets - shift, noise=phase.noise.plus((shift / 2) ** 2))
@@ -240,7 +242,7 @@ def _solve(
             scales=result.scales,
             max_iterations=options.max_iterations,
         )
-        history.append(("stiffness with damping", result))
+        history += _rows("stiffness with damping", result)
     posterior = Posterior(
         frame=frame,
         stiffness=phase,
@@ -251,6 +253,11 @@ def _solve(
     )
     earlier = () if start is None else start.history
     return _Update(problem=problem, posterior=posterior, history=(*earlier, *history), excluded=excluded)
+
+
+def _rows(phase: str, result: PhaseResult) -> list[dict[str, str | float]]:
+    """Rows of the history: results of phases that were done again take too much memory."""
+    return [{"phase": phase, **row} for row in result.rows]
 
 
 def _values_before(update_of: _Update) -> ComplexArray:
@@ -274,12 +281,11 @@ def _stiffness_phase(problem: UpdateProblem, frame: ModalFrame) -> StiffnessPhas
     size = np.abs(problem.values)
     # d ln|s| = (Re s d Re s + Im s d Im s) / |s|^2
     gradient = np.stack([problem.values.real, problem.values.imag], axis=1) / size[:, None] ** 2
-    modal_basis = modal_parameters(frame, basis)
     return StiffnessPhase(
         eigenvalues=frame.eigenvalues,
-        basis=modal_basis,
-        by_stiffness=factorise(modal_basis.stiffness),
-        by_mass=factorise(modal_basis.mass),
+        basis=basis,
+        by_stiffness=factorise(basis.stiffness, frame.shapes),
+        by_mass=factorise(basis.mass, frame.shapes),
         target_roots=TargetRoots(frf=problem.frf, rows=_modal_rows(problem, frame)),
         targets=np.log(size),
         noise=project(problem.covariance, gradient).plus(np.full(len(size), SMALLEST_NOISE**2)),
@@ -301,11 +307,12 @@ def _damping_phase(
     of_shapes = result.error**2
     return damping_phase(
         phase.basis,
+        frame.shapes @ inner.shapes,
         inner,
         TargetRoots(
             frf=problem.frf, rows={number: (out @ inner.shapes, force @ inner.shapes) for number, (out, force) in rows}
         ),
-        inner.to_modal(frame.to_modal(problem.model.damping) + _damping_by_stiffness(phase, result.theta)),
+        inner.to_modal(frame.to_modal(problem.model.damping + _damping_by_stiffness(phase, result.theta))),
         _dashpots(problem, frame, inner),
         problem.values,
         project(problem.covariance, real_part).plus((of_damping + of_shapes) * np.abs(problem.values) ** 2),
@@ -342,7 +349,7 @@ def _updated(update_of: _Update, options: UpdateOptions) -> UpdatedModel:
         nominal=problem.model,
         method="minimal-change",
         status=UpdateStatus.CONVERGED if converged else UpdateStatus.MAX_ITERATIONS,
-        history=pd.DataFrame([{"phase": name, **row} for name, result in update_of.history for row in result.rows]),
+        history=pd.DataFrame(list(update_of.history)),
         before=problem.computed,
         after=update_of.values,
         ensemble=ensemble,

@@ -274,6 +274,7 @@ class DampingPhase:
 
 def damping_phase(
     basis: ParameterBasis,
+    turn: FloatArray,
     inner: ModalFrame,
     target_roots: TargetRoots,
     matrix: FloatArray,
@@ -287,9 +288,11 @@ def damping_phase(
     Parameters
     ----------
     basis : ParameterBasis
-        Parameters in the coordinates of the stiffness phase.
+        Parameters in the coordinates of the model.
+    turn : (r, r) array
+        Motion of these for unit motions of the inner ones.
     inner : ModalFrame
-        Modes of the model with updated stiffness, in the same coordinates.
+        Modes of the model with updated stiffness, in the coordinates of the stiffness phase.
     target_roots : TargetRoots
         Poles and zeros that are targets, with rows in the inner coordinates.
     matrix : (r, r) array
@@ -316,7 +319,7 @@ def damping_phase(
     roots = np.sqrt(np.where(rates > 0, rates, 1.0))
     shape = matrix / roots[:, None] / roots
     np.fill_diagonal(shape, 1.0)
-    extra, terms = _extra_parameters(basis, inner, dashpots)
+    extra, terms = _extra_parameters(basis, turn, dashpots)
     sizes = np.maximum(np.abs(values.real), SMALL_DAMPING * typical_ratio * np.abs(values))
     target_undamped = nominal_roots(target_roots, np.eye(len(rates)), np.diag(inner.eigenvalues), undamped)
     from_shapes = _real_parts(target_undamped, len(values)) / sizes
@@ -344,13 +347,13 @@ def _real_parts(undamped: TrackedRoots, count: int) -> FloatArray:
 
 
 def _extra_parameters(
-    basis: ParameterBasis, inner: ModalFrame, dashpots: FloatArray
+    basis: ParameterBasis, turn: FloatArray, dashpots: FloatArray
 ) -> tuple[FloatArray, tuple[PriorTerm, ...]]:
     """Damping matrices of a diagnosis and that of the dashpots, with the prior of their factors."""
     is_damping = (
         ~np.any(basis.stiffness, axis=(1, 2)) & ~np.any(basis.mass, axis=(1, 2)) & np.any(basis.damping, axis=(1, 2))
     )
-    matrices = [*inner.to_modal(basis.damping[is_damping]), *([dashpots] if np.any(dashpots) else [])]
+    matrices = [*(turn.T @ basis.damping[is_damping] @ turn), *([dashpots] if np.any(dashpots) else [])]
     unit = np.eye(len(matrices))
     count = int(is_damping.sum())
     terms = [

@@ -214,7 +214,8 @@ def iterate(
     whitened = np.zeros(sum(term.root.shape[1] for term in phase.terms)) if start is None else start
     state = _Iterate(whitened, unwhiten(phase.terms, scales[:-1], whitened), tracked, phase.errors(tracked))
     nonlinearity, rows, converged, best = CURVATURE * state.error**2, [], False, state
-    for iteration in range(1, (max_iterations or MAX_ITERATIONS) + 1):
+    last = max_iterations or MAX_ITERATIONS
+    for iteration in range(1, last + 1):
         slopes = phase.slopes(state.theta, state.tracked)
         data = state.error + slopes @ state.theta
         searching = not scales_are_held and iteration <= SCALE_ITERATIONS
@@ -249,6 +250,8 @@ def iterate(
         if converged or rows[-1]["misfit"] < MET * len(data):
             converged = True
             break
+        if iteration < last:
+            del linear, step  # as large as those that take their place
     return PhaseResult(
         whitened=state.whitened,
         theta=state.theta,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,6 @@ from frf_ipz.numerics.pencils import separate_equal_modes, undamped_poles
 
 if TYPE_CHECKING:
     from frf_ipz.structure import ReducedModel
-    from frf_ipz.updating.parameters import ParameterBasis
 
 INDEFINITE = 1e-9  # part of the largest eigenvalue below which a negative one is rounding
 
@@ -123,35 +122,3 @@ def frame_of(model: ReducedModel, at_ports: FloatArray) -> ModalFrame:
     frame = modal_frame(model.mass, model.stiffness)
     eigenvalues, turn = separate_equal_modes(frame.eigenvalues, at_ports @ frame.shapes)
     return ModalFrame(eigenvalues=eigenvalues, shapes=frame.shapes @ turn, inverse=turn.T @ frame.inverse)
-
-
-def modal_parameters(frame: ModalFrame, basis: ParameterBasis) -> ParameterBasis:
-    """Express parameters in modal coordinates.
-
-    Parameters
-    ----------
-    frame : ModalFrame
-        The coordinates.
-    basis : ParameterBasis
-        Parameters of the model.
-
-    Returns
-    -------
-    ParameterBasis
-        The same parameters.
-    """
-    return replace(
-        basis,
-        mass=_to_modal(frame, basis.mass),
-        damping=_to_modal(frame, basis.damping),
-        stiffness=_to_modal(frame, basis.stiffness),
-    )
-
-
-def _to_modal(frame: ModalFrame, matrices: FloatArray) -> FloatArray:
-    """Transform those that are not zero, one by one: the others take neither time nor memory."""
-    result = np.zeros(matrices.shape)
-    for transformed, matrix in zip(result, matrices, strict=True):
-        if np.any(matrix):
-            transformed[:] = frame.to_modal(matrix)
-    return result

@@ -30,7 +30,7 @@ class StiffnessPhase:
     eigenvalues : (r,) array
         Squared natural frequencies of the nominal model, (rad/s)^2: its stiffness; its mass is the unit matrix.
     basis : ParameterBasis
-        In the same coordinates.
+        In the coordinates of the model.
     target_roots : TargetRoots
         Poles and zeros that are targets.
     targets : (n,) array
@@ -38,7 +38,7 @@ class StiffnessPhase:
     noise : TargetNoise
         Their covariance.
     by_stiffness, by_mass : LowRankMatrices
-        The matrices of the parameters.
+        The matrices of the parameters in modal coordinates.
     changes_mass : bool
         False where no parameter changes the mass: its derivatives are then not needed.
     """
@@ -76,10 +76,13 @@ class StiffnessPhase:
             Matrices.
         """
         amounts = self.basis.amounts(theta)
-        mass = np.broadcast_to(np.eye(len(self.eigenvalues)), (*theta.shape[:-1], *self.basis.mass.shape[1:]))
-        if self.changes_mass:
-            mass = mass + np.tensordot(amounts, self.basis.mass, 1)
-        return mass, np.diag(self.eigenvalues) + np.tensordot(amounts, self.basis.stiffness, 1)
+        shape = (*theta.shape[:-1], *np.diag(self.eigenvalues).shape)
+        mass, stiffness = np.zeros(shape), np.zeros(shape)
+        self.by_mass.add_sums(mass, amounts)
+        self.by_stiffness.add_sums(stiffness, amounts)
+        mass += np.eye(len(self.eigenvalues))
+        stiffness += np.diag(self.eigenvalues)
+        return mass, stiffness
 
     def named_roots(self, theta: FloatArray, computed: ComplexArray) -> TrackedRoots:
         """Find the roots that the pairing named.
