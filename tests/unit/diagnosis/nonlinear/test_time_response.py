@@ -13,6 +13,7 @@ from frf_ipz.diagnosis.nonlinear.segments import SegmentWindow, cut_segments
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
 STEP = 1e-3  # prior standard deviations: a change of the motion by less than a part in 1e3
+ROUNDING = 1e-30  # m: states of modes that no force excites
 CLOSE = 1e-4  # of the largest difference: what its step leaves
 
 
@@ -45,7 +46,7 @@ def test_the_motion_follows_small_changes_of_the_model(chain, strike, moves):
     if moves:
         starts += [starts[-1] + n, starts[-1] + n + prior.initial_states.size]
     for kind, first in enumerate(starts):
-        for mode in (0, n - 1):
+        for mode in (0, 1):
             ends = []
             for sign in (1, -1):
                 changed = nuisance.copy()
@@ -58,4 +59,4 @@ def test_the_motion_follows_small_changes_of_the_model(chain, strike, moves):
                 ends.append(motion(changed))
             expected = ((ends[0] - ends[1]) / (2 * STEP)).swapaxes(0, 1)
             error = np.abs(columns[:, kind * n + mode] - expected)
-            assert (error.max((0, 2)) <= CLOSE * np.abs(expected).max((0, 2))).all()
+            assert (error.max((0, 2)) <= CLOSE * np.abs(expected).max((0, 2)) + ROUNDING).all()
