@@ -196,9 +196,10 @@ class TimeResponse:
     def _changed_modes(self, which: int, change: float) -> DiscreteModes:
         """Discretise the free modes with other frequencies (0) or damping ratios (1)."""
         free = self.nuisance_prior.modes
-        poles = [part[free] for part in self.nuisance_prior.modal_model.poles(self.nuisance_values)]
-        poles[which] = poles[which] * (1 + change)
-        return discretise_modes(*poles, self.step_s)
+        factors = [1.0, 1.0]
+        factors[which] += change
+        omega, ratio = self.nuisance_prior.modal_model.poles(self.nuisance_values)
+        return discretise_modes(omega[free] * factors[0], ratio[free] * factors[1], self.step_s)
 
     def _derive_by_free_vibration(self) -> FloatArray:
         """(n_moving, 6, n_free, 2, n_times) change of what follows from the initial states, all kinds of columns."""
