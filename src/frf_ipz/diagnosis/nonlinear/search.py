@@ -35,6 +35,7 @@ from frf_ipz.diagnosis.nonlinear.fitting.simple_laws import (
     locate_unknown_law,
     simple_forces,
 )
+from frf_ipz.diagnosis.nonlinear.fitting.time_steps import resolve_in_time
 from frf_ipz.diagnosis.nonlinear.law_in_time import simulate_law_in_time
 from frf_ipz.diagnosis.nonlinear.laws.finder import select_laws
 from frf_ipz.diagnosis.nonlinear.linearity import Linearity, assess_linearity
@@ -262,11 +263,14 @@ def _search_catalogue(data: LawFitData, linearity: Linearity, laws: Sequence[Law
 
     is_strong = short.mean_misfit > WEAK
     first = partial(make_problem, FIRST_PERIODS / data.training.band_hz[1], ROUGH) if is_strong else None
-    fits, gain_of_others = find_candidates(short, long, laws, first=first), cache(partial(_gain_of_other_forces, long))
+    long, fits = resolve_in_time(long, find_candidates(short, long, laws, first=first))
+    steps, gain_of_others = long.segments.steps_per_sample, cache(partial(_gain_of_other_forces, long))
     judge = partial(_judge, long, linearity, data.modal_model, fits, gain_of_others)
     result = replace(judge(), dispersion_rad=data.dispersion_rad)
     later = [times * short.duration_s for times in LATER if times * short.duration_s < long.duration_s]
-    first_moments = chain([short], (make_problem(duration, FINE) for duration in later))
+    first_moments = (
+        problem.with_steps(steps) for problem in chain([short], (make_problem(duration, FINE) for duration in later))
+    )
     if (
         result.fit is not None
         and result.verdict == DiagnosisVerdict.UNEXPLAINED

@@ -62,8 +62,8 @@ class SegmentSet:
         N s.
     start_force : (n_segments, 2) array
         Force and its slope at the start of segments that start in motion, N and N/s; else 0.
-    fine_force : (n_segments, steps_per_sample * n_samples) array
-        Force at the time steps of a simulation, N.
+    finest_force : (n_segments, REFINEMENT * n_samples) array
+        Force at the shortest time steps of a simulation, N.
     motion : (n_segments, n_sensors, n_lines) complex array
         Responses as displacements, in the signs of the sensors, m s; 0 where a record has no such sensor.
     noise : (n_segments, n_sensors, n_lines) array
@@ -82,6 +82,8 @@ class SegmentSet:
         Of the record, at the start.
     window : SegmentWindow
         How they were cut.
+    steps_per_sample : int
+        Time steps of a simulation per sample of the recordings; a power of two up to REFINEMENT.
     """
 
     s: ComplexArray
@@ -90,7 +92,7 @@ class SegmentSet:
     n_samples: int
     force: ComplexArray
     start_force: FloatArray
-    fine_force: FloatArray
+    finest_force: FloatArray
     motion: ComplexArray
     noise: FloatArray
     variance: FloatArray
@@ -100,6 +102,7 @@ class SegmentSet:
     pause_s: FloatArray
     first_sample: IntArray
     window: SegmentWindow
+    steps_per_sample: int = REFINEMENT
 
     @property
     def n_segments(self) -> int:
@@ -112,9 +115,9 @@ class SegmentSet:
         return self.n_samples * self.step_s
 
     @property
-    def steps_per_sample(self) -> int:
-        """Time steps of a simulation per sample of the recordings."""
-        return int(self.fine_force.shape[1] // self.n_samples)
+    def fine_force(self) -> FloatArray:
+        """(n_segments, steps_per_sample * n_samples) force at the time steps of a simulation, N."""
+        return self.finest_force[:, :: REFINEMENT // self.steps_per_sample]
 
     @property
     def sigma_1_s(self) -> float:
@@ -202,7 +205,7 @@ def cut_segments(
         n_samples=n,
         force=force,
         start_force=start_force,
-        fine_force=fine_force,
+        finest_force=fine_force,
         motion=motion,
         noise=noisy,
         variance=variance,

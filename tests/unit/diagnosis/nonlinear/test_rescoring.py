@@ -12,6 +12,7 @@ from frf_ipz.diagnosis.nonlinear.fitting.problem import LawFitData
 from frf_ipz.diagnosis.nonlinear.fitting.rescoring import rescore, select_contenders
 from frf_ipz.diagnosis.nonlinear.laws.finder import shipped_laws
 from frf_ipz.diagnosis.nonlinear.model.modal_model import make_modal_model
+from frf_ipz.diagnosis.nonlinear.segments import REFINEMENT
 from frf_ipz.diagnosis.options import DiagnoseOptions
 
 FRICTION_N = 0.05
@@ -29,7 +30,7 @@ def problem(chain, strike):
         noise=read_noise(observations),
         options=DiagnoseOptions(),
     )
-    return data.make_problem(1.0, GUESSED_ERROR, loudest=False)
+    return data.make_problem(1.0, GUESSED_ERROR, loudest=False).with_steps(REFINEMENT)
 
 
 def fit_at(problem, node):

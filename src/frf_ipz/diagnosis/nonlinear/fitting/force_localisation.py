@@ -15,7 +15,7 @@ import numpy as np
 from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawStart, estimate_location_motion
 from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import as_real_rows, linear_sensor_motion
 from frf_ipz.diagnosis.nonlinear.fitting.location_motion import NumericalLaplace
-from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import ROUNDING
+from frf_ipz.diagnosis.nonlinear.fitting.normal_equations import ROUNDING, assemble
 from frf_ipz.diagnosis.nonlinear.model.modal_model import respond
 from frf_ipz.numerics.levenberg_marquardt import AcceptedStep, LevenbergMarquardt, NormalEquations, minimise
 
@@ -142,12 +142,16 @@ class _FreeForceProblem:
     def linearise(self, projection: _Projection) -> NormalEquations:
         """Derive by the nuisance parameters, without the part that a force can follow."""
         on_used = projection.response.on(self.segments.used)
-        columns = self.linear.nuisance_prior.jacobian(self.segments, on_used, projection.force, self.location)
-        along = projection.to_sensors * _force_along(projection.to_sensors, columns)[..., None, :]
-        rows = as_real_rows(columns - along)
-        return NormalEquations(
-            matrix=rows @ rows.T + np.eye(len(rows)), right=rows @ projection.misfit - projection.nuisance
+        nuisance_prior, to_sensors = self.linear.nuisance_prior, projection.to_sensors
+        structural = nuisance_prior.structural_jacobian(self.segments, on_used, projection.force, self.location)
+        of_states = nuisance_prior.state_jacobian(self.segments, on_used).swapaxes(1, 2)
+        matrix, right = assemble(
+            _across_force(to_sensors, structural),
+            _across_force(to_sensors[nuisance_prior.moving], of_states).swapaxes(1, 2),
+            projection.misfit.view(complex).reshape(to_sensors.shape),
+            nuisance_prior.moving,
         )
+        return NormalEquations(matrix=matrix + np.eye(len(matrix)), right=right - projection.nuisance)
 
     def move(self, projection: _Projection, _equations: NormalEquations, step: FloatArray) -> _Projection:
         """Find the best force with other nuisance parameters."""
@@ -341,6 +345,11 @@ def _project(segments: SegmentSet, linear: LinearFit, location: int, nuisance: F
     return _Projection(
         response=response, to_sensors=to_sensors, force=force, misfit=misfit, nuisance=nuisance, cost=cost
     )
+
+
+def _across_force(to_sensors: ComplexArray, values: ComplexArray) -> ComplexArray:
+    """Leave out of weighted values (..., n_segments, n_sensors, n_used) what a force at the location can follow."""
+    return np.asarray(values - to_sensors * _force_along(to_sensors, values)[..., None, :])
 
 
 def _force_along(to_sensors: ComplexArray, values: ComplexArray) -> ComplexArray:

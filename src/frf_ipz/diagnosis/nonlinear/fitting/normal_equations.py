@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy import linalg
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 
 ROUNDING = 1e-10  # added to normal equations of unit diagonal: they stay positive definite
 LEAST_COLUMN = 1e-100  # norm of a column: of a number without effect
@@ -30,6 +32,51 @@ def solve_scaled(normal: FloatArray, right: FloatArray) -> FloatArray:
     scaled = normal * scale * scale[:, None] + ROUNDING * np.eye(len(normal))
     solution = linalg.cho_solve(linalg.cho_factor(scaled, lower=True), (right.T * scale).T)
     return np.asarray((solution.T * scale).T)
+
+
+def assemble(
+    structural: ComplexArray, of_states: ComplexArray, misfit: ComplexArray, moving: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Assemble normal equations in which the initial state of a segment changes nothing but that segment.
+
+    Parameters
+    ----------
+    structural : (n_structural, n_segments, n_sensors, n_used) complex array
+        Derivatives by what all segments have in common.
+    of_states : (2, n_moving, n_free, n_sensors, n_used) complex array
+        Derivatives of segments by their own states.
+    misfit : (n_segments, n_sensors, n_used) complex array
+        Weighted as they are.
+    moving : (n_moving,) int array
+        Which segments these are.
+
+    Returns
+    -------
+    matrix : (n, n) array
+        Sums of products of derivatives, of real and imaginary parts, for all n parameters as in `NuisancePrior`.
+    right : (n,) array
+        Sums of their products with the misfit.
+    """
+    n_structural, n_segments = structural.shape[:2]
+    n_moving, n_free = of_states.shape[1:3]
+    shared = np.ascontiguousarray(structural.reshape(n_structural, n_segments, -1)).view(float)
+    own = np.ascontiguousarray(
+        of_states.swapaxes(0, 1).reshape(n_moving, 2 * n_free, math.prod(misfit.shape[1:]))
+    ).view(float)
+    left = np.ascontiguousarray(misfit.reshape(n_segments, -1)).view(float)
+    flat = shared.reshape(n_structural, -1)
+    matrix = np.zeros((n_structural + 2 * n_moving * n_free,) * 2)
+    right = np.zeros(len(matrix))
+    matrix[:n_structural, :n_structural] = flat @ flat.T
+    right[:n_structural] = flat @ left.reshape(-1)
+    for number, segment in enumerate(moving):
+        first = n_structural + number * n_free + np.arange(n_free)
+        at = np.concatenate([first, first + n_moving * n_free])
+        matrix[np.ix_(at, at)] = own[number] @ own[number].T
+        across = shared[:, segment] @ own[number].T
+        matrix[:n_structural, at], matrix[at, :n_structural] = across, across.T
+        right[at] = own[number] @ left[segment]
+    return matrix, right
 
 
 def solve_with_prior(

@@ -96,6 +96,14 @@ class Simulation:
         covariance[: len(sizes), : len(sizes)] = inverse * sizes * sizes[:, None]
         return covariance
 
+    def weigh(self, segments: SegmentSet) -> Simulation:
+        """Weigh the misfit by the variance of other data, which are the same but for that."""
+        used, present = segments.used, np.isfinite(segments.variance)
+        known = np.where(present, self.time_response.segments.variance, 0.0)
+        ratio = np.sqrt(known / np.where(present, segments.variance, 1.0))[:, :, used]
+        misfit = as_real_rows(self.misfit.view(complex).reshape(ratio.shape) * ratio)
+        return replace(self, time_response=replace(self.time_response, segments=segments), misfit=misfit)
+
     def is_of(self, segments: SegmentSet, nuisance_prior: NuisancePrior, start: LawStart) -> bool:
         """Tell whether these data would be simulated with these numbers."""
         simulated, time_response = self.start, self.time_response
@@ -267,7 +275,7 @@ def _derivative_rows(simulation: Simulation, added: FloatArray | None = None) ->
         by_force = step_tangent(start.law, simulation.compliance, simulation.history, changes, added)
     to_sensors = simulation.response.to_sensors(start.location)[:, used]
     weight = 1 / np.sqrt(segments.variance[:, :, used])
-    lines = _transform_force(segments, by_force, holds=start.law.holds)[..., used]
+    lines = _transform_force(segments, by_force, holds=start.law.holds)[..., used].swapaxes(0, 1)
     with np.errstate(all="ignore"):
         by_law = -to_sensors * lines[:, :, None] * weight
     on_used = simulation.response.on(used)
@@ -286,7 +294,7 @@ def _derivative_rows(simulation: Simulation, added: FloatArray | None = None) ->
         for segment in nuisance_prior.moving:
             rows[first : first + n_free, segment] += by_law[(4 + which) * n_free : (5 + which) * n_free, segment]
             first += n_free
-    real_rows = np.nan_to_num(as_real_rows(np.concatenate([rows, by_law[len(changes) :]])), posinf=0.0, neginf=0.0)
+    real_rows = np.nan_to_num(as_real_rows(np.concatenate([rows, by_law[changes.shape[1] :]])), posinf=0.0, neginf=0.0)
     return np.where(np.abs(real_rows).max(axis=1, keepdims=True) < DIVERGED, real_rows, 0.0)
 
 

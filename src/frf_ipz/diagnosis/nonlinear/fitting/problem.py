@@ -16,6 +16,7 @@ from frf_ipz.diagnosis.measured.preprocessing.dispersion import remove_dispersio
 from frf_ipz.diagnosis.nonlinear.fitting.force_localisation import all_locations, localise_force, neighbours
 from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import fit_linear
 from frf_ipz.diagnosis.nonlinear.fitting.output_error_fit import fit_output_error
+from frf_ipz.diagnosis.nonlinear.fitting.time_steps import first_steps
 from frf_ipz.diagnosis.nonlinear.model.nuisance_prior import make_nuisance_prior
 from frf_ipz.diagnosis.nonlinear.segments import SegmentWindow, cut_segments, starts_at_rest
 
@@ -73,6 +74,10 @@ class LawFitProblem:
     def duration_s(self) -> float:
         """Length of the segments, s."""
         return self.segments.duration_s
+
+    def with_steps(self, steps_per_sample: int) -> LawFitProblem:
+        """Simulate in other time steps."""
+        return replace(self, segments=replace(self.segments, steps_per_sample=steps_per_sample))
 
     def neighbours_of(self, location: int) -> list[int]:
         """Possible locations among the few that move most like a location."""
@@ -137,6 +142,7 @@ class LawFitData:
         """Cut segments of one length, with all locations possible."""
         window = SegmentWindow(duration_s=duration_s, floor=floor, loudest=loudest)
         segments = cut_segments(self.training, self.modal_model, self.noise, window)
+        segments = replace(segments, steps_per_sample=first_steps(segments, self.training.band_hz[1]))
         nuisance_prior = make_nuisance_prior(self.modal_model, segments, self.training.band_hz[1], self.options)
         return LawFitProblem(
             segments=segments,
@@ -187,6 +193,7 @@ class LawFitData:
         self.deadline.check()
         training = self.without_dispersion(dispersion_rad).training
         segments = cut_segments(training, self.modal_model, self.noise, long.segments.window)
+        segments = replace(segments, steps_per_sample=long.segments.steps_per_sample)
         return fit_output_error(segments, long.linear.nuisance_prior, fit.start(), iterations=STEPS).cost
 
     def _choose_lengths(self) -> tuple[LawFitProblem, LawFitProblem]:

@@ -75,8 +75,10 @@ def _reweight(problem: LawFitProblem, fit: LawFit) -> LawFit:
     for _ in range(ROUNDS):
         ratio = _along_lines(segments, _variance_ratio(segments, fit))
         reweighted = replace(segments, variance=segments.variance * ratio)
-        refitted = fit_output_error(reweighted, nuisance_prior, fit.start(), iterations=STEPS)
-        fit = fit_output_error(segments, nuisance_prior, refitted.start(), iterations=0)
+        known = fit.simulation and fit.simulation.weigh(reweighted)
+        refitted = fit_output_error(reweighted, nuisance_prior, fit.start(), iterations=STEPS, known=known)
+        known = refitted.simulation and refitted.simulation.weigh(segments)
+        fit = fit_output_error(segments, nuisance_prior, refitted.start(), iterations=0, known=known)
     return fit
 
 

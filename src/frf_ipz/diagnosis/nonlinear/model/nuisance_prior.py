@@ -200,6 +200,57 @@ class NuisancePrior:
         (n_nuisance, n_segments, n_sensors, n_used) complex array
             Per prior standard deviation, over the standard deviation of the data.
         """
+        structural = self.structural_jacobian(segments, response, location_force, location, nuisance)
+        if not len(self.moving):
+            return structural
+        of_states = self.state_jacobian(segments, response)
+        dense = np.zeros((*of_states.shape[:3], *structural.shape[1:]), complex)
+        for number, segment in enumerate(self.moving):
+            dense[:, number, :, segment] = of_states[:, number]
+        return np.concatenate([structural, dense.reshape(-1, *structural.shape[1:])])
+
+    def state_jacobian(self, segments: SegmentSet, response: ModalResponse) -> ComplexArray:
+        """Derive the weighted responses of each segment that starts in motion by its own initial state.
+
+        Parameters
+        ----------
+        segments : SegmentSet
+            The data; `response` is on their used lines.
+        response : ModalResponse
+            The structure with its present nuisance values.
+
+        Returns
+        -------
+        (2, n_moving, n_free, n_sensors, n_used) complex array
+            By displacements times omega, and by velocities; per prior standard deviation, over that of the data.
+        """
+        weight = 1 / np.sqrt(segments.variance[self.moving][:, :, segments.used])
+        columns = np.empty((2, *self.initial_states.shape, *weight.shape[1:]), complex)
+        for row, (sensor, shape) in enumerate(zip(self.modal_model.sensors, response.sensor_shapes, strict=True)):
+            free = _free_vibration(response, self.modes, sensor.quantity.power) * shape[self.modes, None]
+            columns[..., row, :] = free[:, None] * self.initial_states[..., None] * weight[:, None, row]
+        return columns
+
+    def structural_jacobian(
+        self,
+        segments: SegmentSet,
+        response: ModalResponse,
+        location_force: ComplexArray,
+        location: int | None,
+        nuisance: FloatArray | None = None,
+    ) -> ComplexArray:
+        """Derive the weighted responses by the parameters of the structure: the first `n_structural` of `jacobian`.
+
+        Parameters
+        ----------
+        segments, response, location_force, location, nuisance
+            As for `jacobian`.
+
+        Returns
+        -------
+        (n_structural, n_segments, n_sensors, n_used) complex array
+            Per prior standard deviation, over the standard deviation of the data.
+        """
         modes = self.modes
         receptance = response.modes[modes]
         force = segments.force[:, segments.used]
@@ -225,7 +276,6 @@ class NuisancePrior:
             parts.append(at_sensors(by_shape))
         spread = np.zeros(len(modes)) if location is None else self.locations[location]
         parts.append(at_sensors(location_force[:, None] * receptance * spread[:, None]))
-        parts += self._derive_by_initial_states(response, weight)
         columns = np.concatenate(parts)
         if nuisance is not None and len(self.moving):
             by_pole = self._derive_free_vibration_by_poles(nuisance, response)
@@ -257,14 +307,6 @@ class NuisancePrior:
                 rows.append(np.einsum("cbm,cml->mbl", states, scaled))
             derivatives.append(np.stack(rows, 2))
         return np.concatenate(derivatives)
-
-    def _derive_by_initial_states(self, response: ModalResponse, weight: FloatArray) -> list[ComplexArray]:
-        columns = np.zeros((2, *self.initial_states.shape, *weight.shape), complex)
-        for row, (sensor, shape) in enumerate(zip(self.modal_model.sensors, response.sensor_shapes, strict=True)):
-            free = _free_vibration(response, self.modes, sensor.quantity.power) * shape[self.modes, None]
-            for number, segment in enumerate(self.moving):
-                columns[:, number, :, segment, row] = free * self.initial_states[number][:, None] * weight[segment, row]
-        return list(columns.reshape(-1, self.initial_states.shape[1], *weight.shape)) if len(self.moving) else []
 
     def keep_initial_states(self, nuisance: FloatArray) -> FloatArray:
         """Set all nuisance parameters to zero but the initial states of elastic modes.

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.signal import lfilter
 
-from frf_ipz.arrays import FloatArray
+from frf_ipz.arrays import ComplexArray, FloatArray
 from frf_ipz.diagnosis.nonlinear.model.time_stepping import DiscreteModes, LocationCompliance, discretise_modes
 
 if TYPE_CHECKING:
@@ -97,22 +98,17 @@ class TimeResponse:
 
         Returns
         -------
-        (n_columns, 2, n_segments, n_times) array
+        (n_segments, n_columns, 2, n_times) array
             Per prior standard deviation: frequencies, damping ratios, shapes at the input and at the location, and,
             where segments start in motion, displacements and velocities at the start; of each mode that is free.
         """
-        nuisance_prior, modes = self.nuisance_prior, self.modes()
-        free = nuisance_prior.modes
-        total = self.input_forces()[:, free] - self.shapes[free, None] * law_force[:, None]
-        columns = [self._derive_by_poles(total, which) for which in (0, 1)]
-        free_modes = _select_modes(modes, free)
-        inputs = nuisance_prior.inputs[self.segments.input_of]
-        by_input = free_modes.drive(inputs[:, :, None] * self.segments.fine_force[:, None])
-        columns.append(np.stack(self._motion_and_velocity(free_modes, by_input), 1) * self.shapes[free, None])
-        columns.append(self._derive_by_location_shapes(free_modes, total, law_force))
-        if len(nuisance_prior.moving):
-            columns += self._derive_by_initial_states(free_modes)
-        return np.concatenate([column.transpose(2, 1, 0, 3) for column in columns])
+        moving, n_free = self.nuisance_prior.moving, len(self.nuisance_prior.modes)
+        n_segments, n_times = law_force.shape
+        columns = np.zeros((n_segments, 6 if len(moving) else 4, n_free, 2, n_times))
+        self._derive_by_forces(law_force, columns[:, :4])
+        if len(moving):
+            columns[moving] += self._derive_by_free_vibration()
+        return columns.reshape(n_segments, -1, 2, n_times)
 
     def input_forces(self) -> FloatArray:
         """Give the modal forces by the measured force, (n_segments, n_modes, n_times)."""
@@ -131,31 +127,101 @@ class TimeResponse:
         rows = self.segments.input_of
         return np.asarray(static[rows, None] * force - inertial[rows, None] * second)
 
-    def _derive_by_poles(self, total: FloatArray, which: int) -> FloatArray:
-        """(n_segments, 2, n_free, n_times) change by frequencies (0) or damping ratios (1)."""
-        nuisance_prior = self.nuisance_prior
-        free = nuisance_prior.modes
-        omega, ratio = nuisance_prior.modal_model.poles(self.nuisance_values)
-        sizes = (nuisance_prior.frequency, nuisance_prior.damping)[which]
-        ends = []
-        for sign in (1, -1):
-            factor = np.ones((2, len(free)))
-            factor[which] += sign * DIFFERENCE
-            modes = discretise_modes(omega[free] * factor[0], ratio[free] * factor[1], self.step_s)
-            z = modes.drive(total)
-            if len(nuisance_prior.moving):
-                z[nuisance_prior.moving] += self._free_vibration(modes)
-            ends.append(np.stack(self._motion_and_velocity(modes, z), 1))
-        return np.asarray((ends[0] - ends[1]) * (sizes * self.shapes[free] / (2 * DIFFERENCE))[:, None])
+    def _derive_by_forces(self, law_force: FloatArray, columns: FloatArray) -> None:
+        """Fill in what follows from the forces, (n_segments, 4, n_free, 2, n_times), without initial states.
 
-    def _derive_by_location_shapes(self, modes: DiscreteModes, total: FloatArray, law_force: FloatArray) -> FloatArray:
-        """(n_segments, 2, n_free, n_times) change by the shapes at the location, as output and as input."""
+        A mode is one filter, and its derivative by the pole the same filter once more: all four kinds of columns are
+        sums of the two forces, of both forces filtered once, and of the total one filtered twice.
+        """
+        segments, free = self.segments, self.nuisance_prior.modes
+        turns = _select_modes(self.modes(), free).turn
+        weights = _as_real_weights(self._force_weights())
+        at_inputs = self.nuisance_prior.modal_model.at_inputs.shapes + self.nuisance_values.inputs
+        signals = np.empty((segments.n_segments, weights.shape[-1], law_force.shape[1]))
+        signals[:, 0], signals[:, 1] = segments.fine_force, law_force
+        for number, (mode, turn) in enumerate(zip(free, turns, strict=True)):
+            by_force, by_law = (lfilter([0, 1], [1, -turn], signals[:, row]) for row in (0, 1))
+            total = at_inputs[segments.input_of, mode, None] * by_force - self.shapes[mode] * by_law
+            for row, part in zip((2, 4, 6), (by_force, by_law, lfilter([1], [1, -turn], total)), strict=True):
+                signals[:, row], signals[:, row + 1] = part.real, part.imag
+            columns[:, :, number] = (weights[:, number] @ signals).reshape(len(signals), 4, 2, -1)
+
+    def _force_weights(self) -> ComplexArray:
+        """(n_segments, n_free, 8, 5) weights of the signals, whose products have the columns as imaginary parts.
+
+        Motion and velocity by frequency, damping ratio, shape at the input and at the location; of the measured force
+        and of the law's, of both filtered with a delay of a step, and of the total one filtered so twice.
+        """
+        nuisance_prior = self.nuisance_prior
+        free, input_of = nuisance_prior.modes, self.segments.input_of
+        modes, slopes = _select_modes(self.modes(), free), self._slopes_by_poles()
+        at_inputs = nuisance_prior.modal_model.at_inputs.shapes + self.nuisance_values.inputs
+        shape, spread = self.shapes[free], nuisance_prior.locations[self.location]
+        loads = at_inputs[input_of][:, free], np.broadcast_to(-shape, (len(input_of), len(free)))
+        inputs = nuisance_prior.inputs[input_of]
+
+        def respond(direct: ComplexArray, filtered: ComplexArray, onto: tuple[FloatArray, FloatArray]) -> ComplexArray:
+            zero = np.zeros_like(onto[0])
+            return np.stack([onto[0] * direct, onto[1] * direct, onto[0] * filtered, onto[1] * filtered, zero], -1)
+
+        once = modes.before + modes.after * modes.turn
+        z, pole, damped = respond(modes.after, once, loads), modes.poles[:, None], modes.poles.imag[:, None]
+        weights = []
+        for slope, size in zip(slopes, (nuisance_prior.frequency, nuisance_prior.damping), strict=True):
+            filtered = slope.before + slope.after * modes.turn - slope.turn * modes.before / modes.turn
+            by_pole = respond(slope.after, filtered, loads)
+            by_pole[..., 4] = slope.turn * (modes.after + modes.before / modes.turn)
+            by_pole = by_pole - z * (slope.poles.imag[:, None] / damped)
+            scale = (shape * size)[:, None] / damped
+            weights += [scale * by_pole, scale * (pole * by_pole + slope.poles[:, None] * z)]
+        by_input = respond(modes.after, once, (inputs * shape, np.zeros_like(inputs))) / damped
+        by_location = respond(modes.after, once, (loads[0] * spread, 2 * loads[1] * spread)) / damped
+        weights += [by_input, pole * by_input, by_location, pole * by_location]
+        return np.stack(weights, 2)
+
+    def _slopes_by_poles(self) -> tuple[DiscreteModes, DiscreteModes]:
+        """Derive the free modes by the logarithms of their frequencies and of their damping ratios."""
+        up_down = [[self._changed_modes(which, sign * DIFFERENCE) for sign in (1, -1)] for which in (0, 1)]
+        by_frequency, by_damping = (
+            DiscreteModes(
+                poles=(up.poles - down.poles) / (2 * DIFFERENCE),
+                turn=(up.turn - down.turn) / (2 * DIFFERENCE),
+                before=(up.before - down.before) / (2 * DIFFERENCE),
+                after=(up.after - down.after) / (2 * DIFFERENCE),
+            )
+            for up, down in up_down
+        )
+        return by_frequency, by_damping
+
+    def _changed_modes(self, which: int, change: float) -> DiscreteModes:
+        """Discretise the free modes with other frequencies (0) or damping ratios (1)."""
+        free = self.nuisance_prior.modes
+        factors = [1.0, 1.0]
+        factors[which] += change
+        omega, ratio = self.nuisance_prior.modal_model.poles(self.nuisance_values)
+        return discretise_modes(omega[free] * factors[0], ratio[free] * factors[1], self.step_s)
+
+    def _derive_by_free_vibration(self) -> FloatArray:
+        """(n_moving, 6, n_free, 2, n_times) change of what follows from the initial states, all kinds of columns."""
         nuisance_prior, shapes = self.nuisance_prior, self.shapes[self.nuisance_prior.modes, None]
-        z = modes.drive(total - shapes * law_force[:, None])
-        if len(nuisance_prior.moving):
-            z[nuisance_prior.moving] += self._free_vibration(modes)
-        sizes = nuisance_prior.locations[self.location][:, None]
-        return np.asarray(np.stack(self._motion_and_velocity(modes, z), 1) * sizes)
+        columns = []
+        for which, sizes in enumerate((nuisance_prior.frequency, nuisance_prior.damping)):
+            up, down = (self._free_motion(self._changed_modes(which, sign * DIFFERENCE)) for sign in (1, -1))
+            columns.append((up - down) * (shapes * sizes[:, None] / (2 * DIFFERENCE))[:, None])
+        modes = _select_modes(self.modes(), nuisance_prior.modes)
+        by_location = self._free_motion(modes) * nuisance_prior.locations[self.location][:, None, None]
+        columns += [np.zeros_like(by_location), by_location]
+        for which in (0, 1):
+            states = np.zeros((2, *nuisance_prior.initial_states.shape))
+            states[which] = nuisance_prior.initial_states
+            columns.append(self._free_motion(modes, states) * shapes[:, None])
+        return np.stack(columns, 1)
+
+    def _free_motion(self, modes: DiscreteModes, states: FloatArray | None = None) -> FloatArray:
+        """(n_moving, n_free, 2, n_times) modal motion and velocity of free vibrations, by default of those fitted."""
+        states = self.nuisance_prior.initial_states_of(self.nuisance) if states is None else states
+        z = _to_complex(modes, states[0], states[1])[:, :, None] * self._unit_motion(modes)
+        return np.stack(self._motion_and_velocity(modes, z), 2)
 
     def _free_vibration(self, modes: DiscreteModes) -> np.ndarray:
         """(n_moving, n_free, n_times) free vibrations of the free modes, which are the first of `modes` or all."""
@@ -163,18 +229,6 @@ class TimeResponse:
         free = self.nuisance_prior.modes
         free_modes = _select_modes(modes, free) if len(modes.poles) > len(free) else modes
         return np.asarray(_to_complex(free_modes, states[0], states[1])[:, :, None] * self._unit_motion(free_modes))
-
-    def _derive_by_initial_states(self, modes: DiscreteModes) -> list[FloatArray]:
-        """Each (n_segments, 2, n_free, n_times): change by displacement and velocity at the start."""
-        nuisance_prior, unit_motion = self.nuisance_prior, self._unit_motion(modes)
-        columns = []
-        for which in (0, 1):
-            unit = [nuisance_prior.initial_states * (which == 0), nuisance_prior.initial_states * (which == 1)]
-            z = np.zeros((self.segments.n_segments, *unit_motion.shape), complex)
-            z[nuisance_prior.moving] = _to_complex(modes, *unit)[:, :, None] * unit_motion
-            motion = np.stack(self._motion_and_velocity(modes, z), 1)
-            columns.append(motion * self.shapes[nuisance_prior.modes, None])
-        return columns
 
     def _unit_motion(self, modes: DiscreteModes) -> np.ndarray:
         times = self.step_s * np.arange(self.segments.fine_force.shape[1])
@@ -191,3 +245,9 @@ def _select_modes(modes: DiscreteModes, which: np.ndarray) -> DiscreteModes:
     return DiscreteModes(
         poles=modes.poles[which], turn=modes.turn[which], before=modes.before[which], after=modes.after[which]
     )
+
+
+def _as_real_weights(weights: ComplexArray) -> FloatArray:
+    """Give weights of real and imaginary parts of signals, of which the first two are real: for imaginary products."""
+    both = np.stack([weights.imag, weights.real], -1).reshape(*weights.shape[:-1], -1)
+    return np.ascontiguousarray(both[..., [0, 2, *range(4, both.shape[-1])]])

@@ -387,22 +387,24 @@ def step_tangent(
         Of the location.
     history : TimeHistory
         Of the law.
-    changes : (n_changes, 2, n_segments, n_times) array
+    changes : (n_segments, n_changes, 2, n_times) array
         Of motion and velocity.
     added : (n_added, n_segments, n_times) array, optional
         Forces beside the law, each a small one, in the motion of the history, N.
 
     Returns
     -------
-    (n_changes + 1 or 2 + n_added, n_segments, n_times) array
+    (n_segments, n_changes + 1 or 2 + n_added, n_times) array
         Of the force; after the changes by the strength, and by the shape if the law has one, relative to their size.
     """
     by_motion, by_velocity, by_numbers = _force_derivatives(law, history)
     if added is not None:
         feedback = 1 - history.step.motion * by_motion - history.step.velocity * by_velocity
         by_numbers = np.concatenate([by_numbers, added * feedback])
-    direct = np.concatenate([changes[:, 0] * by_motion + changes[:, 1] * by_velocity, by_numbers])
-    force = np.ascontiguousarray(direct.transpose(1, 0, 2))  # segment, change, time: without the motion by themselves
+    direct = changes[:, :, 0] * by_motion[:, None]  # without the motion by the forces themselves
+    if by_velocity.any():
+        direct += changes[:, :, 1] * by_velocity[:, None]
+    force = np.concatenate([direct, by_numbers.swapaxes(0, 1)], axis=1)
     state = np.zeros((*force.shape[:2], 2 * len(compliance.weights)))
     for times, block in _split_into_blocks(compliance, force.shape[-1]):
         to_motion, to_velocity = by_motion[:, times], by_velocity[:, times]
@@ -410,7 +412,7 @@ def step_tangent(
         force[..., times] += to_motion[:, None] * motion + to_velocity[:, None] * velocity
         force[..., times] = block.feed_back(force[..., times], to_motion, to_velocity)
         state = block.advance(state, force[..., times])
-    return np.ascontiguousarray(force.transpose(1, 0, 2))
+    return force
 
 
 def _force_derivatives(law: Law, history: TimeHistory) -> tuple[FloatArray, FloatArray, FloatArray]:
