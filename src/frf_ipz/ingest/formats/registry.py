@@ -12,21 +12,24 @@ import numpy as np
 from frf_ipz.dofs import as_dofs
 from frf_ipz.errors import FileFormatError, errors_of_file
 from frf_ipz.ingest import formats
-from frf_ipz.ingest.formats.column_words import FREQUENCY, frf_role
 from frf_ipz.ingest.formats.file_arrays import ArrayFormat
 from frf_ipz.ingest.formats.frf_file import FrfFormat
 from frf_ipz.ingest.formats.modes_file import ModesFormat
 from frf_ipz.ingest.formats.recording import LARGEST, RecordingFormat, TableKeys
 from frf_ipz.ingest.formats.text_layout import read_head, sniff
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from frf_ipz.ingest.formats import column_words
     from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf
     from frf_ipz.ingest.formats.modes_file import ModesSource
     from frf_ipz.ingest.formats.recording import RawRecording, RecordingContents
     from frf_ipz.modes import ModalParameters
+else:
+    column_words = import_late("frf_ipz.ingest.formats.column_words")
 
 FEWEST_COLUMNS = 3  # frequency and two parts of a value
 TWO_PARTS = "an FRF needs real and imaginary part, or magnitude and phase, in one file"
@@ -101,8 +104,8 @@ def _columns_unknown(path: Path) -> str:
     except FileFormatError:
         return ""
     names = next((row for row in reversed(layout.header) if len(row) == layout.n_columns), ())
-    roles = [frf_role(name) for name in names]
-    if names and all(roles) and FREQUENCY not in roles:
+    roles = [column_words.frf_role(name) for name in names]
+    if names and all(roles) and column_words.FREQUENCY not in roles:
         shown = ", ".join(f"'{name[:LETTERS_SHOWN]}'" for name in names[:NAMES_SHOWN])
         return f"; it has no column of frequencies beside {shown}: export them too"
     if names and layout.n_columns == FEWEST_COLUMNS - 1:
