@@ -318,8 +318,8 @@ class StructuralModel(Drawn):
             ``auto``: rows that are zero, rows of the identity, and rows with a penalty such as 1e36 on the diagonal are
             held DOFs, which are left out; ``keep``: all rows are taken as they are.
         units : str or mapping of str to str
-            What matrices and coordinates are in: ``SI``, ``mm-t-s``, ``mm-kg-ms``, ``in-lbf-s``, or the units of
-            ``length``, ``mass`` and ``time``.
+            What matrices and coordinates are in: ``SI``, ``mm-t-s``, ``mm-kg-ms``, ``cm-g-s``, ``in-lbf-s``, or the
+            units of ``length``, ``mass`` and ``time``.
         allow_negative_stiffness : bool
             Whether the stiffness may have negative eigenvalues.
 

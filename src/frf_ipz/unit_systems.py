@@ -34,6 +34,7 @@ SYSTEMS: Mapping[str, tuple[float, float, float]] = {  # length, mass, time
     SI: (1.0, 1.0, 1.0),
     "mm-t-s": (1e-3, 1e3, 1.0),
     "mm-kg-ms": (1e-3, 1.0, 1e-3),
+    "cm-g-s": (1e-2, 1e-3, 1.0),
     "in-lbf-s": (0.0254, 4.4482216152605 / 0.0254, 1.0),  # pound of force and inch by definition
 }
 QUANTITIES = {"length": "m", "mass": "kg", "time": "s"}
@@ -84,8 +85,8 @@ class UnitSystem:
         Parameters
         ----------
         units : str or mapping of str to str
-            ``SI``, ``mm-t-s``, ``mm-kg-ms``, ``in-lbf-s``; or the units of ``length``, ``mass`` and ``time``, as pint
-            reads them.
+            ``SI``, ``mm-t-s``, ``mm-kg-ms``, ``cm-g-s``, ``in-lbf-s``; or the units of ``length``, ``mass`` and
+            ``time``, as pint reads them.
 
         Returns
         -------

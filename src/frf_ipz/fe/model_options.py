@@ -49,8 +49,8 @@ class ModelSection:
         As the user calls it.
     units : str or UnitTable
         What all numbers of the model are in, coordinates and matrices included: ``SI``, ``mm-t-s``, ``mm-kg-ms``,
-        ``in-lbf-s``, or a table such as ``{ length = "mm", mass = "t", time = "s" }`` in units that pint reads. A key
-        that ends in a unit of SI is then in the unit of this system; ``[[port]]`` stays in SI.
+        ``cm-g-s``, ``in-lbf-s``, or a table such as ``{ length = "mm", mass = "t", time = "s" }`` in units that pint
+        reads. A key that ends in a unit of SI is then in the unit of this system; ``[[port]]`` stays in SI.
 
     Raises
     ------

@@ -276,7 +276,7 @@ def test_a_mode_just_inside_the_band_may_have_been_measured_just_outside(fit):
 
 
 @pytest.mark.parametrize(
-    ("system", "factor"), [("mm-t-s", 1e3), ("in-lbf-s", 4.4482216152605 / 0.0254)]
+    ("system", "factor"), [("mm-t-s", 1e3), ("cm-g-s", 1e-3), ("in-lbf-s", 4.4482216152605 / 0.0254)]
 )  # stiffness of translations in N/m, mass in kg
 def test_the_system_of_units_of_matrices_is_named_and_each_file(fit, system, factor):
     """Responses in a unit as much too small would look the same: both files are named with their keys."""

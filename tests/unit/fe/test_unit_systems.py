@@ -60,6 +60,7 @@ def in_units(folder, model, units, length, mass, time):
     [
         ('"mm-t-s"', 1e-3, 1e3, 1.0),
         ('"mm-kg-ms"', 1e-3, 1.0, 1e-3),
+        ('"cm-g-s"', 1e-2, 1e-3, 1.0),
         ('"in-lbf-s"', 0.0254, 175.126835, 1.0),
         ('{ length = "cm", mass = "g", time = "us" }', 1e-2, 1e-3, 1e-6),
         ('{ length = "ft", mass = "slug" }', 0.3048, 14.5939029, 1.0),

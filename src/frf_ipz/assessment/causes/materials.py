@@ -157,7 +157,7 @@ NUMBERS = {
             is_system=True,
             stiffness_power=1,
             mass_power=1,
-            units=((1e3, "mm-t-s"), (175.12683524647636, "in-lbf-s")),
+            units=((1e3, "mm-t-s"), (1e-3, "cm-g-s"), (175.12683524647636, "in-lbf-s")),
         ),
     ),
 }

@@ -68,7 +68,7 @@ def draft_model(contents: FolderContents) -> str:
         return "# Written by 'frf-ipz init': a skeleton." + SKELETON.format(name=name)
     lines = [HEAD, "[model]", 'kind = "matrices"', f"name = {name}"]
     if not found.is_in_si:
-        lines.append(guessed('units = "SI"', "what the deck is in: SI, mm-t-s, mm-kg-ms or in-lbf-s"))
+        lines.append(guessed('units = "SI"', "what the deck is in: SI, mm-t-s, mm-kg-ms, cm-g-s or in-lbf-s"))
     lines += ["", "[damping]"]
     lines.append(guessed("modal_ratio = 0.01", "one ratio for all modes, or a list; updated where measured"))
     lines += ["", "[matrices]", *_matrices(contents)]
