@@ -181,6 +181,26 @@ def test_a_line_that_stands_there_twice_is_named(tmp_path):
     assert re.search(r"frf\.csv, line 6, column 'frequency_hz': .* a second time, after line 5", says)
 
 
+@pytest.mark.parametrize(
+    ("name", "keys", "is_said"),
+    [
+        ("Magnitude [dB]", {}, True),
+        ("Magnitude [dB re 1 m/s²/N]", {}, False),
+        ("Magnitude [dB]", {"unit": "m/s^2/N"}, False),
+    ],
+)
+def test_what_decibels_are_taken_to_be_relative_to_is_said_where_nobody_does(tmp_path, name, keys, is_said):
+    moving = VALUES[1:, 0]
+    columns = [LINES_HZ[1:], 20 * np.log10(np.abs(moving)), np.degrees(np.angle(moving))]
+    header = f"Frequency [Hz];{name};Phase [deg]"
+    rows = "\n".join(";".join(map(str, row)) for row in np.column_stack(columns).tolist())
+    (tmp_path / "frf.txt").write_text(f"{header}\n{rows}\n", encoding="utf-8")
+    estimate = read(tmp_path, entry("frf.txt", output_dof="1:+z", input_dof="1:+z", **keys))
+    np.testing.assert_allclose(estimate.frfs.values[:, 0], moving, rtol=1e-9)
+    said = [text for text in estimate.warnings if "decibels are taken re 1 m/s^2/N" in text]
+    assert len(said) == is_said
+
+
 @pytest.mark.parametrize("name", ["Magnitude [m/N]", "Amplitude dB", "Abs (m/s²/N)"])
 def test_text_with_magnitudes_only(tmp_path, name):
     header = f"Frequency [Hz];{name};Coherence"

@@ -1,5 +1,7 @@
 """Masses at nodes that an update finds, and what it says of them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -129,3 +131,24 @@ def test_one_of_many_masses_of_nothing_is_hardly_ever_named(beam):
     assert not len(find_local_masses(basis, draws[0][:0]))
     (said,) = local_mass_notes(found, n_without_counterpart=2)
     assert "2 measured poles have no counterpart, so that they may stand for something else that is missing" in said
+
+
+@pytest.mark.parametrize(
+    ("unloaded", "loaded", "is_taken"), [(True, True, True), (True, False, False), (False, False, True)]
+)
+def test_masses_of_an_update_that_has_not_converged_are_not_taken_for_one_that_has(
+    monkeypatch, unloaded, loaded, is_taken
+):
+    """Without masses, then with them: the evidence of the second is larger, as far as its last step tells."""
+    names = {"local_masses": [1], "problem": None}
+    updates = [
+        SimpleNamespace(has_converged=converged, log_evidence=evidence, **names)
+        for converged, evidence in ((unloaded, 1.0), (loaded, 2.0))
+    ]
+    monkeypatch.setattr(minimal_change, "_solve_with_masses", lambda *_: updates.pop(0))
+    monkeypatch.setattr(minimal_change, "_promises_masses", lambda *_: True)
+    monkeypatch.setattr(minimal_change, "replace", lambda problem, **_: problem)
+    basis = SimpleNamespace(at_nodes={0: 7}, without=lambda _: None)
+    with_masses = updates[1]
+    taken = minimal_change._likelier(SimpleNamespace(basis=basis), None, None, None)
+    assert (taken is with_masses) == is_taken

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pyarrow as pa
+
+    from frf_ipz.dofs import AnyDof
 else:
     pa = import_late("pyarrow")
 
@@ -109,7 +111,10 @@ class _TextColumns:
                 coherence=columns.get("coherence"),
                 variance=columns.get("variance"),
                 unit=unit,
-                notes=note_at_rest(source, source.output_dof, source.input_dof, left_out),
+                notes=(
+                    *note_at_rest(source, source.output_dof, source.input_dof, left_out),
+                    *_note_reference(source, source.output_dof, source.input_dof, unit),
+                ),
             ),
         )
 
@@ -155,6 +160,18 @@ def _read_columns(source: FrfSource) -> tuple[dict[str, FloatArray], HeaderUnit]
     require_once(layout, name, frequency, np.arange(len(frequency)), "its FRF")
     frequency_hz = frequency * _frequency_factor(layout, name, names.index(name))
     return {"frequency_hz": frequency_hz, **columns}, unit_of_values(_head_rows(layout), names)
+
+
+def _note_reference(source: FrfSource, output_dof: AnyDof, input_dof: AnyDof, stated: str) -> tuple[str, ...]:
+    """Say what levels are taken to be relative to where nobody does: of them no reference goes without saying."""
+    if stated or source.unit or DECIBELS not in source.columns or source.force_dof is not None:
+        return ()
+    unit = source.quantity.unit(output_dof.direction, input_dof.direction)
+    reference = f"1/({unit})" if source.is_reciprocal else unit
+    return (
+        f"{source.path.name}: its decibels are taken re 1 {reference}, as neither its header nor its [[frf]] says re "
+        "what; where they are re another one, write it as 'unit' there",
+    )
 
 
 def _unit_as_meant(source: FrfSource, stated: HeaderUnit) -> str:

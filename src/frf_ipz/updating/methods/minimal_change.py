@@ -114,6 +114,11 @@ class _Update:
         mass, damping, stiffness = free_matrices(nominal, *self.posterior.model())
         return replace(nominal, mass=mass, damping=damping, stiffness=stiffness)
 
+    @property
+    def has_converged(self) -> bool:
+        """Whether both phases have."""
+        return self.posterior.stiffness_result.converged and self.posterior.damping_result.converged
+
     @cached_property
     def local_masses(self) -> pd.DataFrame:
         basis = self.posterior.stiffness.basis
@@ -145,6 +150,8 @@ def _likelier(problem: UpdateProblem, frame: ModalFrame, options: UpdateOptions,
     if not _promises_masses(problem, basis, frame, unloaded):
         return unloaded
     loaded = _solve_with_masses(problem, frame, options, progress)
+    if unloaded.has_converged and not loaded.has_converged:  # its evidence is not that of the likeliest change
+        return unloaded
     return loaded if len(loaded.local_masses) and loaded.log_evidence > unloaded.log_evidence else unloaded
 
 
@@ -339,7 +346,6 @@ def _modal_rows(problem: UpdateProblem, frame: ModalFrame) -> dict[int, tuple[Fl
 
 def _updated(update_of: _Update, options: UpdateOptions) -> UpdatedModel:
     problem, posterior = update_of.problem, update_of.posterior
-    converged = posterior.stiffness_result.converged and posterior.damping_result.converged
     drawn, rng = update_of.drawn or (None, np.random.default_rng(options.seed))
     if drawn is not None and len(drawn) != options.ensemble:
         drawn, rng = None, np.random.default_rng(options.seed)
@@ -348,7 +354,7 @@ def _updated(update_of: _Update, options: UpdateOptions) -> UpdatedModel:
         model=update_of.model,
         nominal=problem.model,
         method="minimal-change",
-        status=UpdateStatus.CONVERGED if converged else UpdateStatus.MAX_ITERATIONS,
+        status=UpdateStatus.CONVERGED if update_of.has_converged else UpdateStatus.MAX_ITERATIONS,
         history=pd.DataFrame(list(update_of.history)),
         before=problem.computed,
         after=update_of.values,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 else:
     linear_sum_assignment = import_late("scipy.optimize", "linear_sum_assignment")
 
-MOST_HALVINGS = 53  # bits of a number: what is as far as that from the mean is the mean
+MOST_HALVINGS = 53  # bits of a number: what is as far as that from a number is the number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -171,12 +171,13 @@ def _stiffness_of(posterior: Posterior, drawn: FloatArray) -> tuple[FloatArray, 
 def _with_positive_mass(
     posterior: Posterior, whitened: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Bring members whose mass no machine has, as those of a model that is far off, half way nearer to the mean.
+    """Bring members whose mass no machine has, as those of a model that is far off, half way nearer to what was found.
 
-    Gives whitened parameters, parameters, mass and stiffness of all.
+    Its mass is positive; that of the mean of the last linear step need not be, where no step leads there. Gives
+    whitened parameters, parameters, mass and stiffness of all.
     """
     phase, result = posterior.stiffness, posterior.stiffness_result
-    mean = result.step.mean
+    found = result.whitened
     for number in range(MOST_HALVINGS + 1):
         theta = unwhiten(phase.terms, result.scales[:-1], whitened)
         mass, stiffness = phase.matrices(theta)
@@ -184,7 +185,7 @@ def _with_positive_mass(
         is_far = values[:, 0] <= np.finfo(float).eps * values.shape[1] * values[:, -1]
         if not is_far.any() or number == MOST_HALVINGS:
             break
-        whitened = np.where(is_far[:, None], mean + (whitened - mean) / 2, whitened)
+        whitened = np.where(is_far[:, None], found + (whitened - found) / 2, whitened)
     return whitened, theta, mass, stiffness
 
 
