@@ -195,7 +195,7 @@ def _explain(text: str, decimal: str) -> str:
         (thousands, f"has a thousands separator; write it as {plain}"),
         (has_other_sign, f"has {written} where numbers have decimal {meant}; write all numbers alike"),
         (
-            any(sign.isdigit() > sign.isascii() for sign in text),
+            any(sign.isdecimal() > sign.isascii() for sign in text),
             "has digits that are none of 0 to 9; write it with those",
         ),
         (is_number(text.replace("_", ""), decimal=decimal), f"has underscores; write it as {text.replace('_', '')}"),

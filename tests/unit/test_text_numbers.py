@@ -40,6 +40,7 @@ REFUSED = {
     "1e999": "larger than any number",
     "٣": "none of 0 to 9",
     "１２": "none of 0 to 9",
+    "12.5 m/s²": "stands where a number is expected",
     "1-3": "is expected",
     "1.0e": "is expected",
     "1..2": "is expected",
