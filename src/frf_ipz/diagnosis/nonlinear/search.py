@@ -259,11 +259,15 @@ def _search_catalogue(data: LawFitData, linearity: Linearity, laws: Sequence[Law
     short, long = data.make_problems()
 
     def make_problem(duration_s: float, floor: float) -> LawFitProblem:
-        return replace(data.make_problem(duration_s, floor, loudest=False), localisation=long.localisation)
+        problem = data.make_problem(duration_s, floor, loudest=False).with_steps(long.segments.steps_per_sample)
+        return replace(problem, localisation=long.localisation)
 
     is_strong = short.mean_misfit > WEAK
     first = partial(make_problem, FIRST_PERIODS / data.training.band_hz[1], ROUGH) if is_strong else None
-    long, fits = resolve_in_time(long, find_candidates(short, long, laws, first=first))
+    fits: list[LawFit] | None = None
+    while fits is None:
+        short = short.with_steps(long.segments.steps_per_sample)
+        long, fits = resolve_in_time(long, find_candidates(short, long, laws, first=first))
     steps, gain_of_others = long.segments.steps_per_sample, cache(partial(_gain_of_other_forces, long))
     judge = partial(_judge, long, linearity, data.modal_model, fits, gain_of_others)
     result = replace(judge(), dispersion_rad=data.dispersion_rad)

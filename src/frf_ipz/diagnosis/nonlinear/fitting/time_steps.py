@@ -2,7 +2,8 @@
 
 A search begins with steps that resolve the top of the band. Its best fits are then simulated in steps half as long: the
 change of the weighted misfit is an estimate of its error by the steps, in standard deviations of the data. No parameter
-is off by more of its standard deviations than that change is long, so that a short one changes no answer.
+is off by more of its standard deviations than that change is long, so that a short one changes no answer. A best fit
+that does not converge at once in the steps that it needs has been found by a wrong simulation: another one may be best.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def first_steps(segments: SegmentSet, top_hz: float) -> int:
     return steps
 
 
-def resolve_in_time(problem: LawFitProblem, fits: Sequence[LawFit]) -> tuple[LawFitProblem, list[LawFit]]:
+def resolve_in_time(problem: LawFitProblem, fits: Sequence[LawFit]) -> tuple[LawFitProblem, list[LawFit] | None]:
     """Fit in more time steps, until twice as many change nothing.
 
     Parameters
@@ -59,8 +60,9 @@ def resolve_in_time(problem: LawFitProblem, fits: Sequence[LawFit]) -> tuple[Law
     -------
     problem : LawFitProblem
         With the time steps that were needed.
-    fits : list of LawFit
-        In these steps, the smallest cost first; those of fits that cannot be the best stay as they are.
+    fits : list of LawFit or None
+        In these steps, the smallest cost first; those of fits that cannot be the best stay as they are. None where the
+        best does not converge in few steps: the search has to be made in these time steps.
     """
     resolved = list(fits)
     while problem.segments.steps_per_sample < REFINEMENT:
@@ -72,6 +74,8 @@ def resolve_in_time(problem: LawFitProblem, fits: Sequence[LawFit]) -> tuple[Law
         problem = finer
         refitted = [finer.fit_output_error(fit, STEPS) for fit in near]
         resolved = sorted(refitted + resolved[len(near) :], key=lambda fit: fit.cost)
+        if not resolved[0].converged:
+            return problem, None
     return problem, resolved
 
 
