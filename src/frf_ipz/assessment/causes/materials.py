@@ -17,6 +17,7 @@ from frf_ipz.assessment.causes.modal_comparison import FREQUENCY_SCALE, computed
 from frf_ipz.errors import FrfIpzError
 from frf_ipz.fe.eigen import solve_modes
 from frf_ipz.fe.kinds.beam import BeamFile, BeamOptions, BeamSection, build_beam
+from frf_ipz.unit_systems import SI, SYSTEMS
 
 if TYPE_CHECKING:
     from frf_ipz.assessment.causes.cause import Situation
@@ -157,7 +158,7 @@ NUMBERS = {
             is_system=True,
             stiffness_power=1,
             mass_power=1,
-            units=((1e3, "mm-t-s"), (1e-3, "cm-g-s"), (175.12683524647636, "in-lbf-s")),
+            units=tuple((mass, name) for name, (_, mass, time) in SYSTEMS.items() if name != SI and time == 1.0),
         ),
     ),
 }

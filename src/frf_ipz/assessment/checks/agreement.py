@@ -234,11 +234,10 @@ def _say_worsened(evidence: Evidence) -> str:
     if inside is None:
         return ""
     texts, labels = [], evidence.frfs.labels
+    off_db = [evidence.decibels(values) for values in (evidence.nominal, evidence.updated)]
     for column in np.flatnonzero(evidence.is_heard.any(axis=0)).tolist():
         heard = evidence.is_heard[:, column]
-        before, after = (
-            float(np.nanmedian(evidence.decibels(values)[:, column])) for values in (evidence.nominal, evidence.updated)
-        )
+        before, after = (float(np.nanmedian(values[:, column])) for values in off_db)
         noise = float(np.median(20 * np.log10(1 + (evidence.noise / np.abs(evidence.measured))[heard, column])))
         share = float(np.mean(inside[heard, column]))
         if after > before + noise and share < INSIDE:

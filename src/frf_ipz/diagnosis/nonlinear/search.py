@@ -268,13 +268,12 @@ def _search_catalogue(data: LawFitData, linearity: Linearity, laws: Sequence[Law
     while fits is None:
         short = short.with_steps(long.segments.steps_per_sample)
         long, fits = resolve_in_time(long, find_candidates(short, long, laws, first=first))
-    steps, gain_of_others = long.segments.steps_per_sample, cache(partial(_gain_of_other_forces, long))
+    gain_of_others = cache(partial(_gain_of_other_forces, long))
     judge = partial(_judge, long, linearity, data.modal_model, fits, gain_of_others)
     result = replace(judge(), dispersion_rad=data.dispersion_rad)
     later = [times * short.duration_s for times in LATER if times * short.duration_s < long.duration_s]
-    first_moments = (
-        problem.with_steps(steps) for problem in chain([short], (make_problem(duration, FINE) for duration in later))
-    )
+    in_steps = short.with_steps(long.segments.steps_per_sample)
+    first_moments = chain([in_steps], (make_problem(duration, FINE) for duration in later))
     if (
         result.fit is not None
         and result.verdict == DiagnosisVerdict.UNEXPLAINED

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from frf_ipz.pipeline.init.text import HEAD, guessed, quoted
+from frf_ipz.unit_systems import SYSTEMS
 
 if TYPE_CHECKING:
     from frf_ipz.pipeline.init.folder_contents import FolderContents
@@ -68,7 +69,8 @@ def draft_model(contents: FolderContents) -> str:
         return "# Written by 'frf-ipz init': a skeleton." + SKELETON.format(name=name)
     lines = [HEAD, "[model]", 'kind = "matrices"', f"name = {name}"]
     if not found.is_in_si:
-        lines.append(guessed('units = "SI"', "what the deck is in: SI, mm-t-s, mm-kg-ms, cm-g-s or in-lbf-s"))
+        *systems, last = SYSTEMS
+        lines.append(guessed('units = "SI"', f"what the deck is in: {', '.join(systems)} or {last}"))
     lines += ["", "[damping]"]
     lines.append(guessed("modal_ratio = 0.01", "one ratio for all modes, or a list; updated where measured"))
     lines += ["", "[matrices]", *_matrices(contents)]

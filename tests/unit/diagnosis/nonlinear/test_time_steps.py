@@ -48,6 +48,17 @@ def test_steps_are_halved_until_that_changes_nothing(chain, strike, monkeypatch,
     assert best.motion.shape[1] == steps * problem.segments.n_samples
 
 
+def test_a_fit_that_does_not_converge_in_the_steps_that_it_needs_is_searched_for_again(chain, strike, monkeypatch):
+    problem, fit = fit_law(chain, strike, "cubic_stiffness", K3, lambda w, _: K3 * w**3)
+    problem = problem.with_steps(1)
+    fit = problem.fit_output_error(fit, 6)
+    monkeypatch.setattr(time_steps, "LARGEST_CHANGE", 1e-9)
+    monkeypatch.setattr(time_steps, "STEPS", 0)
+    finer, fits = resolve_in_time(problem, [fit])
+    assert fits is None
+    assert finer.segments.steps_per_sample == 2
+
+
 def test_a_search_begins_with_steps_that_resolve_the_band(chain, strike):
     problem, _ = fit_law(chain, strike, "cubic_stiffness", K3, lambda w, _: K3 * w**3)
     segments, rate = problem.segments, 1 / problem.segments.step_s
