@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
+NOT_FINITE = "must not contain infs or NaNs"  # what NumPy and SciPy say of such arrays, as an error of values
+UNITS_OF_MODEL = (
+    "check the units and sizes of the model (masses, springs, lengths) and of what was measured"  # that spread numbers
+)
 MOST_LETTERS = 800  # of a problem, of which the end says what to do; a damaged file may have a name of any length
 
 
@@ -235,13 +239,15 @@ def errors_of_file(path: Path | str, *, where: str = "") -> Iterator[None]:
 
 
 @contextmanager
-def errors_of_arithmetic(what: str) -> Iterator[None]:
+def errors_of_arithmetic(what: str, *, advice: str = UNITS_OF_MODEL) -> Iterator[None]:
     """Say as an error of the package that numbers leave double precision, or memory does not hold them.
 
     Parameters
     ----------
     what : str
         What is computed.
+    advice : str, optional
+        What to do where numbers leave double precision; by itself what may be wrong with a model.
 
     Yields
     ------
@@ -255,13 +261,12 @@ def errors_of_arithmetic(what: str) -> Iterator[None]:
     """
     try:
         yield
-    except (np.linalg.LinAlgError, FloatingPointError, OverflowError):
-        raise IllConditionedError(
-            f"{what}: numbers lie too many decades apart for double precision; check the units and sizes of the model "
-            "(masses, springs, lengths) and of what was measured"
-        ) from None
     except MemoryError:
         raise IllConditionedError(f"{what}: memory does not hold it; use a smaller model or fewer lines") from None
+    except (np.linalg.LinAlgError, FloatingPointError, OverflowError, ValueError) as error:
+        if isinstance(error, FrfIpzError) or (type(error) is ValueError and NOT_FINITE not in str(error)):
+            raise
+        raise IllConditionedError(f"{what}: numbers lie too many decades apart for double precision; {advice}") from None
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

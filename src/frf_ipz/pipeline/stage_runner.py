@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
-from frf_ipz.errors import errors_of_arithmetic
+from frf_ipz.errors import IllConditionedError, NumericalError, errors_of_arithmetic
 from frf_ipz.input_files import entering
 from frf_ipz.runs.digests import digest
 from frf_ipz.runs.software import software
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from frf_ipz.ingest.recording_files import RecordingFiles
     from frf_ipz.pipeline.inputs import PipelineInputs
@@ -37,6 +38,71 @@ NEEDS = {
     "export": ("update",),
     "files": ("fit",),
 }
+
+OF_MODEL = "check the units and sizes of the model (masses, springs, lengths)"
+OF_TEST = "look at the FRFs, and leave out lines that hold no signal ([fit] band_hz, exclude_hz)"
+OF_UPDATE = "look at what is paired with what (frf-ipz pair), and leave out of [fit] band_hz what the model cannot follow"
+
+# What each stage tries, and what to do where its numbers leave double precision.
+TRIES = {
+    "ingest": ("to estimate FRFs from what was recorded", "look at the recordings, and leave out the wrong ones"),
+    "fit": ("to fit poles and zeros to the measured FRFs", OF_TEST),
+    "levels": ("to compare FRFs at several levels", OF_TEST),
+    "diagnose": ("to say what the model left out", '[diagnose] run = "never" does without'),
+    "model": ("to place the nodes of the model", OF_MODEL),
+    "reduce": ("to reduce the model", OF_MODEL),
+    "pair": ("to pair measured with computed poles and zeros", f"{OF_MODEL} and of what was measured"),
+    "update": ("to bring the model to the measured poles and zeros", OF_UPDATE),
+    "predict": ("to predict FRFs with the updated model", OF_UPDATE),
+    "causes": ("to update a model that was corrected by the diagnosis", '[diagnose] run = "never" does without'),
+    "assess": ("to judge the results", OF_UPDATE),
+    "export": ("to write the updated model in states", OF_UPDATE),
+    "files": ("to write files of other software", OF_TEST),
+    "report": ("to write the page", OF_TEST),
+}
+OF_INPUTS = ("ingest", "fit", "levels", "diagnose", "model", "reduce")  # whose matrices are those of the user's files
+
+
+@contextmanager
+def errors_of_stage(name: str) -> Iterator[None]:
+    """Say what a stage tried where its numbers leave double precision.
+
+    Parameters
+    ----------
+    name : str
+        The stage.
+
+    Yields
+    ------
+    None
+        While it is run.
+
+    Raises
+    ------
+    IllConditionedError
+        In a stage that works on what the user's files hold, or where a key is to be changed.
+    NumericalError
+        In one that works on what the stages before it have made: no file of the user's is at fault by itself.
+
+    Examples
+    --------
+    >>> try:
+    ...     with errors_of_stage("assess"):
+    ...         raise FloatingPointError
+    ... except NumericalError as error:
+    ...     print(str(error).partition(";")[0])
+    the stage 'assess' tried to judge the results: numbers lie too many decades apart for double precision
+    """
+    tried, advice = TRIES.get(name, ("to compute", OF_MODEL))
+    what = f"the stage '{name}' tried {tried}"
+    try:
+        with errors_of_arithmetic(what, advice=advice):
+            yield
+    except IllConditionedError as error:
+        if name in OF_INPUTS or error.key:
+            raise
+        problem = str(error).partition(";")[0].removeprefix(f"{what}: ")  # what to do with a file is not what helps here
+        raise NumericalError(f"{what}: {problem}; {advice}") from error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,7 +155,7 @@ class StageRunner:
             The result.
         """
         key = self.make_key(name, depends)
-        with errors_of_arithmetic(f"the stage '{name}'"):
+        with errors_of_stage(name):
             result = self.store.stage(name, key, lambda: self._compute(name, compute), files)
         if name in self.store.computed:
             self.store.mark_stale(dependents(name))

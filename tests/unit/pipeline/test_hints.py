@@ -2,8 +2,9 @@
 
 import re
 
+import numpy as np
 import pytest
-from scipy import io
+from scipy import io, linalg
 
 import frf_ipz
 from frf_ipz.errors import FileFormatError, IllConditionedError, InputError, NoModesError, NumericalError
@@ -51,6 +52,43 @@ def test_matrices_that_cannot_be_computed_with_are_an_error_of_their_file(tmp_pa
     error = IllConditionedError("the modes can hardly be told apart", key=key)
     with pytest.raises(FileFormatError, match=f"{re.escape(place)} can hardly be told apart$"):
         fail_with(tmp_path, lambda text: text, error)
+
+
+def overflow(*_, **__):
+    raise np.linalg.LinAlgError
+
+
+def do_not_end(*_, **__):
+    linalg.eigvalsh([[np.inf]])
+
+
+def be_singular(*_, **__):
+    raise IllConditionedError("a matrix of order 3 is singular; check the model's mass and stiffness matrices")
+
+
+@pytest.mark.parametrize("fault", [overflow, do_not_end, be_singular])
+@pytest.mark.parametrize(
+    ("module", "function", "tried"),
+    [
+        ("modelling", "pair_roots", "'pair' tried to pair measured with computed poles and zeros"),
+        ("modelling", "update_model", "'update' tried to bring the model to the measured poles and zeros"),
+        ("outputs", "predict_frfs", "'predict' tried to predict FRFs with the updated model"),
+    ],
+)
+def test_numbers_of_a_late_stage_are_laid_to_no_file(tmp_path, monkeypatch, module, function, tried, fault):
+    monkeypatch.setattr(f"frf_ipz.pipeline.stages.{module}.{function}", fault)
+    with pytest.raises(NumericalError, match=f"^the stage {tried}: (numbers|a matrix) [^;]*; (look at|check)") as caught:
+        frf_ipz.run_pipeline(write_campaign(tmp_path), tmp_path / "run")
+    assert "model.toml" not in str(caught.value)
+    assert "mass and stiffness matrices" not in str(caught.value)
+
+
+def test_a_diagnosis_that_fails_on_its_own_numbers_names_no_model(tmp_path, monkeypatch):
+    monkeypatch.setattr("frf_ipz.pipeline.stages.mismatch.find_causes", overflow)
+    pipeline = write_campaign(tmp_path)
+    pipeline.write_text(pipeline.read_text().replace('run = "never"', 'run = "always"'))
+    with pytest.raises(NumericalError, match=r"^the stage 'diagnose' tried to say what .*; \[diagnose\] run = \"never\""):
+        frf_ipz.run_pipeline(pipeline, tmp_path / "run")
 
 
 @pytest.mark.parametrize("diagnosis", ["", '[diagnose]\nrun = "always"\n', "[diagnose]\napply = true\n"])

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from frf_ipz.assessment.assess import likely_cause
     from frf_ipz.assessment.assessment import LikelyCause
     from frf_ipz.assessment.causes.columns import find_exchanged_columns
+    from frf_ipz.fe.eigen import solve_modes
     from frf_ipz.identification.modal_fit import ModalFit
     from frf_ipz.ingest.frf_estimate import FrfEstimate
     from frf_ipz.pipeline.inputs import PipelineInputs
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 else:
     likely_cause = import_late("frf_ipz.assessment.assess", "likely_cause")
     find_exchanged_columns = import_late("frf_ipz.assessment.causes.columns", "find_exchanged_columns")
+    solve_modes = import_late("frf_ipz.fe.eigen", "solve_modes")
+
+FEW_MODES = 10  # whether these can be computed tells whether a model can
 
 
 @contextmanager
@@ -61,12 +65,15 @@ def naming_the_cause(
     except NumericalError as error:
         impacts = inputs.impacts(recordings)
         cause = likely_cause(recordings.frfs, fit, fe_model, impacts=impacts, **inputs.places_of_mistakes)
-        _raise_with(cause, error, inputs, file=inputs.model_file)
+        file = inputs.model_file if cause is None and _is_at_fault(inputs, fe_model, error) else ""
+        _raise_with(cause, error, inputs, file=file)
 
 
 @contextmanager
 def naming_the_model(inputs: PipelineInputs) -> Iterator[None]:
     """Name the model's file where its matrices are at fault: that is an error of the input.
+
+    They are where the model alone cannot be computed with, as its file has it; not where one cannot that was made of it.
 
     Parameters
     ----------
@@ -81,12 +88,12 @@ def naming_the_model(inputs: PipelineInputs) -> Iterator[None]:
     Raises
     ------
     InputError
-        Where matrices are at fault.
+        Where matrices are at fault; else the error of the stage goes on.
     """
     try:
         yield
     except IllConditionedError as error:
-        _raise_with(None, error, inputs, file=inputs.model_file)
+        _raise_with(None, error, inputs, file=inputs.model_file if _is_at_fault(inputs, None, error) else "")
 
 
 @contextmanager
@@ -118,12 +125,26 @@ def naming_exchanged_columns(inputs: PipelineInputs, recordings: FrfEstimate) ->
         _raise_with(cause, error, inputs, file=str(inputs.test.path))
 
 
+def _is_at_fault(inputs: PipelineInputs, reduced: StructuralModel | None, error: NumericalError) -> bool:
+    """Tell whether the model's file is at fault: what was reduced is what it holds, or its modes have no end either."""
+    model = inputs.fe_model
+    if model is None or not isinstance(error, IllConditionedError):
+        return False
+    if model is reduced:
+        return True
+    try:
+        solve_modes(model, n_modes=min(FEW_MODES, model.n_modes))
+    except IllConditionedError:
+        return True
+    return False
+
+
 def _raise_with(cause: LikelyCause | None, error: FrfIpzError, inputs: PipelineInputs, *, file: str) -> NoReturn:
-    """Raise an error with its likely cause, or with the file whose matrices are at fault."""
+    """Raise an error with its likely cause, or with the file that is at fault, if one is."""
     if cause is not None:
         raise InputError(f"{inputs.source}: {error}; most likely {cause.says} ({cause.place})") from error
-    if not isinstance(error, IllConditionedError):
-        raise error
-    if error.key:
+    if isinstance(error, IllConditionedError) and error.key:
         raise FileFormatError(inputs.source, str(error), where=f"key '{error.key}'") from error
-    raise FileFormatError(file, str(error)) from error
+    if isinstance(error, IllConditionedError) and file:
+        raise FileFormatError(file, str(error)) from error
+    raise error

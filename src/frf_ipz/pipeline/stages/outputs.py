@@ -13,6 +13,7 @@ from frf_ipz.export import run_tables as tables
 from frf_ipz.export.parquet import write_table
 from frf_ipz.frf import FrfSet
 from frf_ipz.late_imports import import_late
+from frf_ipz.pipeline.stage_runner import errors_of_stage
 from frf_ipz.pipeline.stages.delays import known_delays
 from frf_ipz.pipeline.stages.mismatch import effects_of
 from frf_ipz.runs.digests import digest_arrays
@@ -244,7 +245,8 @@ def files(runner: StageRunner, modal_fit: ModalFit, frfs: FrfSet) -> None:
         name: partial(write_frfs, measured) if name == "frf.unv" else partial(write_modes, modal_fit, geometry=geometry)
         for name in asked
     }
-    runner.store.page("files", key, write_all)
+    with errors_of_stage("files"):
+        runner.store.page("files", key, write_all)
 
 
 def _geometry(runner: StageRunner) -> Geometry | None:
@@ -266,9 +268,10 @@ def report(runner: StageRunner) -> None:
         "report", {"after": sorted(runner.keys.values()), "test": dict(runner.inputs.test.particulars)}
     )
     progress = runner.stage_progress("report")
-    runner.store.page(
-        "report", key, {"report.html": lambda path: write_report(Results(runner.store), path, progress=progress)}
-    )
+    with errors_of_stage("report"):
+        runner.store.page(
+            "report", key, {"report.html": lambda path: write_report(Results(runner.store), path, progress=progress)}
+        )
 
 
 def _design_files(
