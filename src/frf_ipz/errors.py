@@ -266,7 +266,9 @@ def errors_of_arithmetic(what: str, *, advice: str = UNITS_OF_MODEL) -> Iterator
     except (np.linalg.LinAlgError, FloatingPointError, OverflowError, ValueError) as error:
         if isinstance(error, FrfIpzError) or (type(error) is ValueError and NOT_FINITE not in str(error)):
             raise
-        raise IllConditionedError(f"{what}: numbers lie too many decades apart for double precision; {advice}") from None
+        raise IllConditionedError(
+            f"{what}: numbers lie too many decades apart for double precision; {advice}"
+        ) from None
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

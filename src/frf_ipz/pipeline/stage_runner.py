@@ -41,7 +41,9 @@ NEEDS = {
 
 OF_MODEL = "check the units and sizes of the model (masses, springs, lengths)"
 OF_TEST = "look at the FRFs, and leave out lines that hold no signal ([fit] band_hz, exclude_hz)"
-OF_UPDATE = "look at what is paired with what (frf-ipz pair), and leave out of [fit] band_hz what the model cannot follow"
+OF_UPDATE = (
+    "look at what is paired with what (frf-ipz pair), and leave out of [fit] band_hz what no mode of the model is"
+)
 
 # What each stage tries, and what to do where its numbers leave double precision.
 TRIES = {
@@ -101,7 +103,7 @@ def errors_of_stage(name: str) -> Iterator[None]:
     except IllConditionedError as error:
         if name in OF_INPUTS or error.key:
             raise
-        problem = str(error).partition(";")[0].removeprefix(f"{what}: ")  # what to do with a file is not what helps here
+        problem = str(error).partition(";")[0].removeprefix(f"{what}: ")  # a file is not what has to be corrected
         raise NumericalError(f"{what}: {problem}; {advice}") from error
 
 

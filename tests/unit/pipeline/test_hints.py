@@ -77,7 +77,9 @@ def be_singular(*_, **__):
 )
 def test_numbers_of_a_late_stage_are_laid_to_no_file(tmp_path, monkeypatch, module, function, tried, fault):
     monkeypatch.setattr(f"frf_ipz.pipeline.stages.{module}.{function}", fault)
-    with pytest.raises(NumericalError, match=f"^the stage {tried}: (numbers|a matrix) [^;]*; (look at|check)") as caught:
+    with pytest.raises(
+        NumericalError, match=f"^the stage {tried}: (numbers|a matrix) [^;]*; (look at|check)"
+    ) as caught:
         frf_ipz.run_pipeline(write_campaign(tmp_path), tmp_path / "run")
     assert "model.toml" not in str(caught.value)
     assert "mass and stiffness matrices" not in str(caught.value)
@@ -87,7 +89,7 @@ def test_a_diagnosis_that_fails_on_its_own_numbers_names_no_model(tmp_path, monk
     monkeypatch.setattr("frf_ipz.pipeline.stages.mismatch.find_causes", overflow)
     pipeline = write_campaign(tmp_path)
     pipeline.write_text(pipeline.read_text().replace('run = "never"', 'run = "always"'))
-    with pytest.raises(NumericalError, match=r"^the stage 'diagnose' tried to say what .*; \[diagnose\] run = \"never\""):
+    with pytest.raises(NumericalError, match=r"^the stage 'diagnose' tried to say .*; \[diagnose\] run = \"never\""):
         frf_ipz.run_pipeline(pipeline, tmp_path / "run")
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats import frf_text
 from frf_ipz.ingest.formats.column_words import DEGREES, GERMAN, GRAD, frf_role
+from frf_ipz.ingest.formats.decibels import DECIBELS
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf
 from frf_ipz.ingest.formats.text_layout import is_number, name_and_unit, sniff
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import ComplexArray
     from frf_ipz.ingest.formats.text_layout import TextLayout
 
-MAGNITUDES = {"magnitude", "magnitude_db"}
+MAGNITUDES = {"magnitude", DECIBELS}
 PHASES = {"real", "imag", "phase_deg", "phase_rad"}
 LABELS = ("output_dof", "input_dof")
 LEAST_SPAN = 2.0 * np.pi  # degrees: within it phases without a unit may be radians
@@ -109,7 +110,7 @@ def find_frf_columns(source: FrfSource) -> AnalyserColumns | None:
     for words, roles in _possible_headers(layout):
         known = set(roles)
         is_complete = {"real", "imag"} <= known or (
-            bool(known & {"magnitude", "magnitude_db"}) and bool(known & {"phase_deg", "phase_rad"})
+            bool(known & {"magnitude", DECIBELS}) and bool(known & {"phase_deg", "phase_rad"})
         )
         named = [role for role in roles if role != frf_text.SKIP]
         if (

@@ -17,6 +17,7 @@ from frf_ipz.arrays import complex_array
 from frf_ipz.dofs import AnyDof, Dof, parse_dof
 from frf_ipz.errors import FileFormatError, InputError, QuantityError, did_you_mean
 from frf_ipz.ingest.formats.column_words import ANGULAR
+from frf_ipz.ingest.formats.decibels import DECIBELS, join_polar
 from frf_ipz.ingest.formats.file_arrays import FileArrays, describe, last_part
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.recording_arrays import RATE
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from frf_ipz.ingest.formats.file_arrays import NumericArray
 
 FREQUENCIES = {"frequency_hz": 1.0, "frequency_rad_s": 1.0 / (2.0 * np.pi)}
-PARTS = ("frf", "real", "imag", "magnitude", "magnitude_db", "phase_deg", "phase_rad")
+PARTS = ("frf", "real", "imag", "magnitude", DECIBELS, "phase_deg", "phase_rad")
 GRID = ("frequency_step_hz", "frequency_start_hz")
 ROUNDED = 1e-6  # beyond 1, of a coherence computed in single precision
 SAMPLE_RATE = "sample_rate_hz"  # the lines go from 0 Hz to half of it
@@ -65,6 +66,8 @@ class FrfBlock:
         Where the file has them.
     unit : str
         What the file says; may be empty.
+    is_level : bool
+        The values were levels in decibels, relative to that unit.
     about : str
         How it was found.
     """
@@ -76,6 +79,7 @@ class FrfBlock:
     coherence: FloatArray | None = None
     variance: FloatArray | None = None
     unit: str = ""
+    is_level: bool = False
     about: str = ""
 
 
@@ -162,7 +166,7 @@ def find_frfs(source: FrfSource) -> tuple[FrfBlock, ...]:
 def _named_block(arrays: FileArrays, variables: Mapping[str, str]) -> FrfBlock:
     given = {key: arrays.select(name) for key, name in variables.items()}
     values = _complex_values(arrays, given)
-    name = next(name for key, name in variables.items() if key in PARTS)
+    name = next(variables[key] for key in PARTS if key in variables)
     axes = [key for key in given if key in FREQUENCIES]
     is_grid = GRID[0] in given or SAMPLE_RATE in given
     own, about = None if axes or is_grid else _own_frequencies(values), ""
@@ -197,6 +201,7 @@ def _named_block(arrays: FileArrays, variables: Mapping[str, str]) -> FrfBlock:
         coherence=others.get("coherence"),
         variance=others.get("variance"),
         unit=_unit_beside(arrays, name),
+        is_level=DECIBELS in given,
         about=about,
     )
 
@@ -206,16 +211,14 @@ def _complex_values(arrays: FileArrays, given: Mapping[str, NumericArray]) -> Co
         joined = _joined_columns(given["frf"])
         return np.asarray(given["frf"], np.complex128) if joined is None else joined
     parts = set(given) & set(PARTS)
-    magnitudes, phases = parts & {"magnitude", "magnitude_db"}, parts & {"phase_deg", "phase_rad"}
+    magnitudes, phases = parts & {"magnitude", DECIBELS}, parts & {"phase_deg", "phase_rad"}
     shapes = {given[key].shape for key in parts}
     if len(shapes) != 1 or not (parts == {"real", "imag"} or (len(magnitudes) == 1 and len(phases) == 1)):
         problem = f"'variables' names {', '.join(sorted(parts))}; needed is frf, or real and imag, or a magnitude and a"
         raise FileFormatError(arrays.path, f"{problem} phase, of one shape")
     if parts == {"real", "imag"}:
         return complex_array(given["real"], given["imag"])
-    magnitude = given["magnitude"] if "magnitude" in given else 10.0 ** (given["magnitude_db"] / 20.0)
-    phase = given["phase_rad"] if "phase_rad" in given else np.radians(given["phase_deg"])
-    return np.asarray(magnitude * np.exp(1j * phase), np.complex128)
+    return join_polar(arrays.path, given, key="variables")
 
 
 def _vector(arrays: FileArrays, name: str, values: NumericArray) -> FloatArray:
@@ -516,6 +519,7 @@ def _measured(source: FrfSource, block: FrfBlock) -> list[MeasuredFrf]:
                 frequency_hz=block.frequency_hz[order],
                 values=one[order],
                 unit=block.unit,
+                is_level=block.is_level,
                 coherence=None if coherence is None else coherence[order, number],
                 variance=None if variance is None else variance[order, number],
                 notes=(

@@ -13,12 +13,16 @@ import numpy as np
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats.registry import read_frf_file
 from frf_ipz.ingest.formats.transmissibility import over_force
+from frf_ipz.late_imports import import_late
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray
+    from frf_ipz.ingest.formats.decibels import with_reference
     from frf_ipz.ingest.formats.frf_file import FrfSource, MeasuredFrf
+else:
+    with_reference = import_late("frf_ipz.ingest.formats.decibels", "with_reference")
 
 PRINTED = 1e-3  # relative: what few printed digits make of two equal numbers
 ROUNDING = 1e-12  # relative: sine of pi in double precision, and of 180 degrees
@@ -50,7 +54,7 @@ def read_frf_source(source: FrfSource) -> tuple[MeasuredFrf, ...]:
     FileFormatError
         If it cannot be read, holds magnitudes only, or is conjugated.
     """
-    frfs = [_check_coherence(_one_sided(_as_stated(frf))) for frf in read_frf_file(source)]
+    frfs = [_check_coherence(_one_sided(_as_stated(with_reference(frf)))) for frf in read_frf_file(source)]
     if source.reference is not None:
         frfs = over_force(source, frfs, read_frf_source(source.reference))
     for frf in frfs:

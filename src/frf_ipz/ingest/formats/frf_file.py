@@ -125,6 +125,8 @@ class MeasuredFrf:
         In `unit`.
     unit : str
         Unit that the file states; empty where it states none.
+    is_level : bool
+        The values were levels in decibels, relative to that unit.
     coherence, variance : (n_lines,) array, optional
         Where the file has them; the variance is in the square of the unit.
     notes : tuple of str
@@ -137,6 +139,7 @@ class MeasuredFrf:
     frequency_hz: FloatArray
     values: ComplexArray
     unit: str = ""
+    is_level: bool = False
     coherence: FloatArray | None = None
     variance: FloatArray | None = None
     notes: tuple[str, ...] = ()

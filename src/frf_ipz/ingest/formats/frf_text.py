@@ -12,6 +12,7 @@ import numpy as np
 from frf_ipz.arrays import ComplexArray, FloatArray, complex_array
 from frf_ipz.errors import FileFormatError, QuantityError, did_you_mean
 from frf_ipz.ingest.formats.column_words import ANGULAR, FREQUENCY, LEVEL, NO_SCALE, frf_role
+from frf_ipz.ingest.formats.decibels import DECIBELS, EMPTY_BRACKETS, is_level, join_polar, reference_of
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import (
     COMMENT,
@@ -27,15 +28,13 @@ from frf_ipz.ingest.formats.text_table import not_a_number, read_blocks, require
 from frf_ipz.ingest.units import frequency_factor, frf_factor, is_frequency_unit, is_stated, is_unit
 from frf_ipz.late_imports import import_late
 from frf_ipz.quantities import FrfQuantity
-from frf_ipz.text_numbers import parse_number
 from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     import pyarrow as pa
-
-    from frf_ipz.dofs import AnyDof
 else:
     pa = import_late("pyarrow")
 
@@ -47,19 +46,17 @@ KNOWN = (
     "real",
     "imag",
     "magnitude",
-    "magnitude_db",
+    DECIBELS,
     "phase_deg",
     "phase_rad",
     "coherence",
     "variance",
     SKIP,
 )
-DECIBELS = "magnitude_db"
 OF_VALUES = {"real", "imag", "magnitude", DECIBELS}  # columns in the unit of the FRF, or relative to it
 RATIO = re.compile(r"\(([^()]+)\)\s*\(([^()]+)\)")  # SignalCalc writes (m/s²)(N) for a ratio
 NO_UNIT = re.compile(r"h\d*(\(.*\))?|frf|lin(ear)?|point[ :]*\d*", re.IGNORECASE)  # what brackets hold beside units
 BRACKETS = re.compile(r"\[([^\[\]]*)\]")
-EMPTY_BRACKETS = re.compile(r"\[\W*\]|\(\W*\)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,9 +91,6 @@ class _TextColumns:
         unit = _unit_as_meant(source, header_unit)
         if source.output_dof is None or source.input_dof is None:
             raise FileFormatError(source.path, "holds one FRF: its [[frf]] needs 'output_dof' and 'input_dof'")
-        if (columns.get("magnitude", np.zeros(0)) < 0.0).any():
-            problem = "holds negative magnitudes; where they are decibels, name the column magnitude_db in 'columns'"
-            raise FileFormatError(source.path, problem)
         left_out = undefined_at_rest(columns)
         columns = {name: values[~left_out] for name, values in columns.items()}
         order = np.argsort(columns["frequency_hz"], kind="stable")
@@ -107,14 +101,12 @@ class _TextColumns:
                 output_dof=source.output_dof,
                 input_dof=source.input_dof,
                 frequency_hz=columns["frequency_hz"],
-                values=_complex_values(columns),
+                values=_complex_values(source.path, columns),
                 coherence=columns.get("coherence"),
                 variance=columns.get("variance"),
                 unit=unit,
-                notes=(
-                    *note_at_rest(source, source.output_dof, source.input_dof, left_out),
-                    *_note_reference(source, source.output_dof, source.input_dof, unit),
-                ),
+                is_level=DECIBELS in columns,
+                notes=note_at_rest(source, source.output_dof, source.input_dof, left_out),
             ),
         )
 
@@ -132,7 +124,7 @@ def _check_columns(source: FrfSource) -> None:
             raise FileFormatError(source.path, f"'columns' names '{name}'; {did_you_mean(name, KNOWN)}")
     columns = set(source.columns)
     is_complete = {"real", "imag"} <= columns or (
-        len(columns & {"magnitude", "magnitude_db"}) == 1 and len(columns & {"phase_deg", "phase_rad"}) == 1
+        len(columns & {"magnitude", DECIBELS}) == 1 and len(columns & {"phase_deg", "phase_rad"}) == 1
     )
     if len(columns & set(FREQUENCIES)) != 1 or not is_complete:
         raise FileFormatError(
@@ -162,20 +154,10 @@ def _read_columns(source: FrfSource) -> tuple[dict[str, FloatArray], HeaderUnit]
     return {"frequency_hz": frequency_hz, **columns}, unit_of_values(_head_rows(layout), names)
 
 
-def _note_reference(source: FrfSource, output_dof: AnyDof, input_dof: AnyDof, stated: str) -> tuple[str, ...]:
-    """Say what levels are taken to be relative to where nobody does: of them no reference goes without saying."""
-    if stated or source.unit or DECIBELS not in source.columns or source.force_dof is not None:
-        return ()
-    unit = source.quantity.unit(output_dof.direction, input_dof.direction)
-    reference = f"1/({unit})" if source.is_reciprocal else unit
-    return (
-        f"{source.path.name}: its decibels are taken re 1 {reference}, as neither its header nor its [[frf]] says re "
-        "what; where they are re another one, write it as 'unit' there",
-    )
-
-
 def _unit_as_meant(source: FrfSource, stated: HeaderUnit) -> str:
     """Give the unit of the values as their header states it; it must be one of what they are said to be."""
+    if DECIBELS not in source.columns and is_level(stated.text):
+        return stated.text
     if not stated.text or source.unit:
         return stated.text
     if stated.quantity is None:
@@ -256,8 +238,7 @@ def _unit_beside(field: str, name: str) -> str:
         return ""
     if level is not None:
         if level["reference"]:
-            text = _closed(field[level.end() :])
-            return text if _is_stated_reference(text) else ""
+            return reference_of(field)
         field = EMPTY_BRACKETS.sub("", field[: level.start()] + field[level.end() :]).strip()
     ratio = RATIO.search(field)
     if ratio:
@@ -266,19 +247,6 @@ def _unit_beside(field: str, name: str) -> str:
     if text:
         return text if _is_claimed(text, name, is_square=field.endswith("]")) else ""
     return _ratio_behind(field)
-
-
-def _closed(text: str) -> str:
-    """Take off brackets that were opened before a text."""
-    for opening, closing in ("[]", "()", "[]"):
-        if text.count(closing) > text.count(opening):
-            text = text.rstrip().removesuffix(closing)
-    return text.strip()
-
-
-def _is_stated_reference(text: str) -> bool:
-    """Tell a reference of decibels from 1, which says nothing."""
-    return is_stated(text) and not (is_number(text) and parse_number(text) == 1.0)
 
 
 def _is_claimed(text: str, name: str, *, is_square: bool) -> bool:
@@ -390,9 +358,7 @@ def stated_frequency_unit(layout: TextLayout, index: int) -> str:
     return ""
 
 
-def _complex_values(columns: dict[str, FloatArray]) -> ComplexArray:
+def _complex_values(path: Path, columns: dict[str, FloatArray]) -> ComplexArray:
     if "real" in columns:
         return complex_array(columns["real"], columns["imag"])
-    phase = columns["phase_rad"] if "phase_rad" in columns else np.radians(columns["phase_deg"])
-    magnitude = columns["magnitude"] if "magnitude" in columns else 10.0 ** (columns["magnitude_db"] / 20.0)
-    return np.asarray(magnitude * np.exp(1j * phase))
+    return join_polar(path, columns, key="columns")

@@ -73,7 +73,7 @@ def naming_the_cause(
 def naming_the_model(inputs: PipelineInputs) -> Iterator[None]:
     """Name the model's file where its matrices are at fault: that is an error of the input.
 
-    They are where the model alone cannot be computed with, as its file has it; not where one cannot that was made of it.
+    They are where the model cannot be computed with as its file has it, not where one cannot that was made of it.
 
     Parameters
     ----------
