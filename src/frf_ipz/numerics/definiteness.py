@@ -20,6 +20,7 @@ from scipy.sparse import linalg as sparse_linalg
 from frf_ipz.errors import InputError
 from frf_ipz.numerics.factorization import is_positive_definite
 from frf_ipz.numerics.held_rows import NOTHING
+from frf_ipz.visible_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -73,19 +74,37 @@ def symmetrise(matrix: Matrix, *, rows: IntArray | None = None) -> Matrix:
         worst = int(np.argmax(excess))
         row, column = int(difference.row[worst]), int(difference.col[worst])
         numbers = np.arange(len(diagonal)) if rows is None else rows
+        advice = _advice_on_asymmetry(matrix, _pairs(matrix, difference, excess))
         raise InputError(
             f"is not symmetric: {matrix[row, column]:.6g} against {matrix[column, row]:.6g} in rows "
-            f"{numbers[row] + 1} and {numbers[column] + 1}; {_advice_on_asymmetry(matrix)}"
+            f"{numbers[row] + 1} and {numbers[column] + 1}; {advice}"
         )
     symmetric: Any = (matrix + matrix.T) / 2
     return sparse.csr_array(symmetric)
 
 
-def _advice_on_asymmetry(matrix: Matrix) -> str:
+def _pairs(matrix: Matrix, difference: sparse.coo_array, excess: FloatArray) -> FloatArray:
+    """Give the pairs of entries that differ beyond rounding, that above the diagonal first, (n_pairs, 2)."""
+    is_upper = (excess > 0) & (difference.row < difference.col)
+    rows, columns = difference.row[is_upper], difference.col[is_upper]
+    entries = sparse.csr_array(matrix)
+    return np.column_stack([np.asarray(entries[rows, columns]).ravel(), np.asarray(entries[columns, rows]).ravel()])
+
+
+def _advice_on_asymmetry(matrix: Matrix, pairs: FloatArray) -> str:
     """Name what makes a matrix unsymmetric, and what to hand in instead."""
     is_half = not (sparse.triu(matrix, 1).count_nonzero() and sparse.tril(matrix, -1).count_nonzero())
     if is_half:
         return "export it with both triangles, or with one of them only and 'symmetric' in its first line"
+    upper, lower = pairs.T
+    if (pairs == 0.0).any(axis=1).all():
+        return f"of {counted(len(pairs), 'pair')} of entries one is missing, and all others agree; export it again"
+    ratio = float(upper[0] / lower[0]) if lower[0] else 0.0
+    is_one_ratio = bool((np.abs(upper - ratio * lower) <= SYMMETRY_TOLERANCE * np.abs(upper)).all())
+    if len(pairs) > 1 and ratio > 0.0 and is_one_ratio:
+        return f"above the diagonal {len(pairs)} entries are {ratio:.4g} times those below; export it again"
+    if len(pairs) == 1 and upper[0] * lower[0] > 0.0:
+        return f"no other pair of entries differs, so that one number may be wrong: export it again. Else {GYROSCOPIC}"
     skew, even = abs(matrix - matrix.T).sum(), abs(sparse.triu(matrix + matrix.T, 1)).sum()
     kind = "entries beside the diagonal have opposite signs in the two triangles" if even < skew else "triangles differ"
     return f"its {kind}: {GYROSCOPIC}"

@@ -62,6 +62,12 @@ def lose_samples_late(signals):
     return np.pad(np.delete(signals, slice(500, 540), axis=1), ((0, 0), (0, 40)))
 
 
+def come_late(signals):
+    """By a filter that the channels of the others lack."""
+    signals[1:, 3:] = signals[1:, :-3].copy()
+    return signals
+
+
 def kill(signals):
     seed = int(1e6 * abs(signals[1, 0]))  # another one in each impact
     signals[1] = NOISE * np.random.default_rng(seed).standard_normal(signals.shape[1])
@@ -114,6 +120,7 @@ def truth_error(result):
         (exchange, "contradicts the other impacts: acc_1 and acc_2 are exchanged"),
         (drop_out, "dropout of acc_1: 60 samples of one value, 0.09766 s after its beginning"),
         (lose_samples, "contradicts the other impacts: 30 samples are lost 0.0976"),
+        (come_late, "contradicts the other impacts: it comes 3 samples (1.46 ms) later after its force"),
     ],
 )
 @pytest.mark.parametrize("impacts", [4, 5])

@@ -225,3 +225,13 @@ def test_a_force_over_a_response_that_is_zero_has_no_reciprocal(tmp_path):
     (tmp_path / "a.csv").write_text("\n".join(["frequency_hz,output_dof,input_dof,real,imag", *rows]) + "\n")
     with pytest.raises(InputError, match="is zero at 7 Hz, and has no reciprocal there"):
         frf_ipz.read_frfs(tmp_path / "a.csv", quantity="impedance")
+
+
+def test_of_frfs_in_one_file_that_which_lacks_lines_is_named(tmp_path):
+    pairs = zip(LINES_HZ.tolist(), VALUES[:, 0].tolist(), strict=True)
+    rows = [f"{hertz!r},{{}},7:+z,{value.real!r},{value.imag!r}" for hertz, value in pairs]
+    both = [row.format("1:+z") for row in rows] + [row.format("2:+z") for row in (*rows[:50], *rows[51:])]
+    (tmp_path / "a.csv").write_text("\n".join(["frequency_hz,output_dof,input_dof,real,imag", *both]))
+    (tmp_path / "test.toml").write_text('[test]\nkind = "frf"\n[[frf]]\nfile = "a.csv"\nquantity = "accelerance"\n')
+    first, second = (estimate := frf_ipz.estimate_frfs(frf_ipz.read_test(tmp_path / "test.toml"))).frfs.labels
+    assert f"; {first} in a.csv has more; {second} in a.csv has the fewest" in " ".join(estimate.warnings)

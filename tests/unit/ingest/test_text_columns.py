@@ -135,7 +135,9 @@ def test_the_time_is_the_column_that_the_test_names(tmp_path):
     path = write(tmp_path, lambda text: swapped(text).replace("time,force,acc_1,acc_2", "force,acc_1,acc_2,clock"))
     expect(read(path, 'time_column = "clock"'))
     assert "time_column = ... where another one is the time: 'force', 'acc_1', 'acc_2', 'clock'" in message(path)
-    assert "has no column 'clok'; did you mean 'clock'" in message(path, 'time_column = "clok"')
+    assert "has no column 'clok', which time_column names; did you mean 'clock'" in message(
+        path, 'time_column = "clok"'
+    )
 
 
 def test_a_file_without_time_needs_a_rate(tmp_path):

@@ -1,5 +1,7 @@
 """Whether large matrices are those of a structure, from few products and from one factor."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -88,3 +90,22 @@ def test_half_a_matrix_is_not_taken_for_gyroscopic():
     with pytest.raises(InputError, match="both triangles") as refusal:
         StructuralModel.from_matrices(MASS, np.triu(STIFFNESS), dofs=DOFS)
     assert "gyroscopic" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words", "else_gyroscopic"),
+    [
+        ({(0, 1): 0.0}, "of 1 pair of entries one is missing, and all others agree; export it again", False),
+        ({(0, 1): 0.0, (2, 1): 0.0}, "of 2 pairs of entries one is missing", False),
+        ({(0, 1): -4e5, (1, 2): -2e5}, "above the diagonal 2 entries are 2 times those below; export it again", False),
+        ({(0, 1): -2.1e5}, "no other pair of entries differs, so that one number may be wrong", True),
+        ({(0, 1): -2.1e5, (1, 2): -1.3e5}, "its triangles differ: a skew-symmetric part", True),
+    ],
+)
+def test_a_lost_or_doubled_entry_is_no_gyroscopic_force(wrong, words, else_gyroscopic):
+    stiffness = np.array([[3e5, -2e5, 0.0], [-2e5, 4e5, -1e5], [0.0, -1e5, 2e5]])
+    for place, value in wrong.items():
+        stiffness[place] = value
+    with pytest.raises(InputError, match=re.escape(words)) as refusal:
+        StructuralModel.from_matrices(np.eye(3), stiffness, dofs=["1:x", "1:y", "1:z"])
+    assert ("gyroscopic" in str(refusal.value)) == else_gyroscopic

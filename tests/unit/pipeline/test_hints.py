@@ -127,6 +127,18 @@ def test_exchanged_columns_are_named_where_nothing_can_be_fitted(tmp_path):
         fail_to_fit(tmp_path, exchange)
 
 
+@pytest.mark.parametrize("factor", [1.0, -2.5])
+def test_a_response_that_is_the_force_again_is_not_called_exchanged(tmp_path, factor):
+    pipeline = write_campaign(tmp_path)
+    for path in tmp_path.glob("hits/*.csv"):
+        head, *_ = path.read_text().splitlines()
+        table = np.loadtxt(path, delimiter=",", skiprows=1)
+        table[:, 2] = factor * table[:, 1]
+        np.savetxt(path, table, delimiter=",", header=head, comments="", fmt="%.6g")
+    with pytest.raises(InputError, match="most likely the column 'acc' holds the force 'force' once more"):
+        frf_ipz.run_pipeline(pipeline, tmp_path / "run", until="fit")
+
+
 def test_a_fit_that_fails_for_other_reasons_says_only_that(tmp_path):
     with pytest.raises(NoModesError, match=r"^no mode stands out$"):
         fail_to_fit(tmp_path, lambda text: text)

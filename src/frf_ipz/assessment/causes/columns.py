@@ -1,4 +1,4 @@
-"""Columns of recordings that are exchanged: those of the force and of a response.
+"""Columns of recordings that are exchanged, those of the force and of a response, or that hold the same.
 
 Of a hammer's impacts, the force rings and the response is a pulse. The effective duration of a signal is that of a
 rectangle with the same energy and the same integral of its fourth power, ``(int x^2)^2 / int x^4``: a pulse is short
@@ -30,11 +30,16 @@ if TYPE_CHECKING:
     from frf_ipz.frf import FrfLabel, FrfSet
     from frf_ipz.ingest.frf_estimate import Trace
 
+PRINTED = 1e-3  # relative: what few printed digits make of two signals that are one
+FEWEST_COMMON = 4  # times at which two signals are compared: one fixes their ratio
+
 
 def find_exchanged_columns(
     impacts: Sequence[Trace], labels: Sequence[FrfLabel], *, test_file: str
 ) -> LikelyCause | None:
-    """Find a response that looks like the hammer's force, and a force that looks like a response.
+    """Find a response that looks like the hammer's force while that looks like a response, or is that force again.
+
+    Durations are known to a step of what is drawn: only what is shorter by more is.
 
     Parameters
     ----------
@@ -50,19 +55,24 @@ def find_exchanged_columns(
     LikelyCause or None
         None where every response lasts longer than the force, or there are no recordings.
     """
+    copied = _find_copied_force(impacts, labels, test_file=test_file)
+    if copied is not None:
+        return copied
     inputs = {label.input_channel for label in labels}
     records = dict.fromkeys(trace.name for trace in impacts)
     found: list[tuple[str, str]] = []
     looked_at = 0
     for record in records:
-        durations = {trace.channel: _duration(trace) for trace in impacts if trace.name == record}
+        traces = [trace for trace in impacts if trace.name == record]
+        durations = {trace.channel: _duration(trace) for trace in traces}
+        step_s = max((float(np.diff(trace.time_s).max(initial=0.0)) for trace in traces), default=0.0)
         forces = [channel for channel in durations if channel in inputs]
         responses = {channel: length for channel, length in durations.items() if channel not in inputs}
         if len(forces) != 1 or not responses:
             continue
         looked_at += 1
         shortest = min(responses, key=responses.__getitem__)
-        if responses[shortest] < durations[forces[0]]:
+        if responses[shortest] < durations[forces[0]] - step_s:
             found.append((forces[0], shortest))
     if not found:
         return None
@@ -74,6 +84,36 @@ def find_exchanged_columns(
         line_or_key=f"[[channel]] column = '{force}' and column = '{response}'",
         probability=found.count((force, response)) / looked_at,
     )
+
+
+def _find_copied_force(impacts: Sequence[Trace], labels: Sequence[FrfLabel], *, test_file: str) -> LikelyCause | None:
+    """Find a response that is in all records a multiple of the force, to the digits that are printed."""
+    inputs = {label.input_channel for label in labels}
+    forces = {trace.name: trace for trace in impacts if trace.channel in inputs}
+    pairs = [(forces[trace.name], trace) for trace in impacts if trace.channel not in inputs and trace.name in forces]
+    for response in dict.fromkeys(trace.channel for _, trace in pairs):
+        of_it = [(force, trace) for force, trace in pairs if trace.channel == response]
+        if not all(_is_multiple(trace, force) for force, trace in of_it):
+            continue
+        name = of_it[0][0].channel
+        return LikelyCause(
+            says=f"the column '{response}' holds the force '{name}' once more: one is a multiple of the other in all "
+            "records",
+            file=test_file,
+            line_or_key=f"[[channel]] column = '{response}'",
+            probability=1.0,
+        )
+    return None
+
+
+def _is_multiple(trace: Trace, force: Trace) -> bool:
+    """Compare two traces at the times that both are drawn at."""
+    common, of_trace, of_force = np.intersect1d(trace.time_s, force.time_s, return_indices=True)
+    values, own = trace.values[of_trace] - np.median(trace.values), force.values[of_force]
+    power = float(own @ own)
+    if len(common) < FEWEST_COMMON or not power or not np.any(values):
+        return False
+    return float(np.linalg.norm(values - (values @ own) / power * own)) <= PRINTED * float(np.linalg.norm(values))
 
 
 def find_inverted_columns(frfs: FrfSet, situation: Situation) -> LikelyCause | None:

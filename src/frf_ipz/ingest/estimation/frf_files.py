@@ -303,15 +303,21 @@ def _say_lines_left_out(frfs: Sequence[MeasuredFrf], n_used: int, largest: int) 
         (first, first.frequency_hz[-1], max(frf.frequency_hz[-1] for frf in frfs), "above", "ends"),
     ]
     spans = [
-        f"; none {side} {bound:g} Hz, where {frf.source.path.name} {verb}"
+        f"; none {side} {bound:g} Hz, where {_named_among(frf, frfs)} {verb}"
         for frf, bound, widest, side, verb in bounds
         if abs(bound - widest) > SIX_DIGITS * abs(bound)
     ]
     coarsest = min(frfs, key=lambda frf: _count_between(frf.frequency_hz, last.frequency_hz[0], first.frequency_hz[-1]))
     if not spans:
-        spans = [f"; {coarsest.source.path.name} has the fewest"]
+        spans = [f"; {_named_among(coarsest, frfs)} has the fewest"]
     used = f"{n_used} of up to {largest} lines are used: those that all FRFs share"
-    return f"{used}; {finest.source.path.name} has more{''.join(spans)}"
+    return f"{used}; {_named_among(finest, frfs)} has more{''.join(spans)}"
+
+
+def _named_among(frf: MeasuredFrf, frfs: Sequence[MeasuredFrf]) -> str:
+    """Name an FRF by its file where no other is in it, else by what it connects too."""
+    name = frf.source.path.name
+    return name if sum(other.source.path == frf.source.path for other in frfs) == 1 else f"{frf.label} in {name}"
 
 
 def _count_between(frequency_hz: FloatArray, low: float, high: float) -> int:

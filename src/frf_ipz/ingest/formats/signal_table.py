@@ -228,7 +228,7 @@ def open_signals(table: SignalTable, columns: Sequence[str], keys: TableKeys) ->
     )
 
 
-def find_signal(table: SignalTable, column: str) -> Signal:
+def find_signal(table: SignalTable, column: str, *, key: str = "column") -> Signal:
     """Find a signal by its name, its DOF, or its number.
 
     Parameters
@@ -237,6 +237,8 @@ def find_signal(table: SignalTable, column: str) -> Signal:
         All signals of the file.
     column : str
         What is wanted.
+    key : str
+        Of the test that names it.
 
     Returns
     -------
@@ -256,14 +258,15 @@ def find_signal(table: SignalTable, column: str) -> Signal:
         if named:
             numbers = [str(n) for n, signal in enumerate(table.signals, start=1) if signal in named]
             problem = f"has {len(named)} signals '{column}', the numbers {', '.join(numbers)}"
-            raise FileFormatError(table.path, f"{problem}; write the number, as in column = {numbers[0]}")
+            raise FileFormatError(table.path, f"{problem}; write the number, as in {key} = {numbers[0]}")
     if column.isascii() and column.isdigit() and 1 <= int(column[:9]) <= len(table.signals):
         return table.signals[int(column) - 1]
     if column in table.unread:
         raise FileFormatError(table.path, table.unread[column])
     names = [signal.name for signal in table.signals]
     problem = f"has no signal '{column}'; {did_you_mean(column, names)}"
-    raise FileFormatError(table.path, f"{problem}; correct 'column' of the [[channel]], or name it under 'variables'")
+    place = "'column' of the [[channel]]" if key == "column" else f"'{key}'"
+    raise FileFormatError(table.path, f"{problem}; correct {place}, or name it under 'variables'")
 
 
 def even_times(n_samples: int, rate_hz: float, start_s: float = 0.0) -> FloatArray:
@@ -311,7 +314,7 @@ def _find_time(table: SignalTable, chosen: Sequence[Signal], keys: TableKeys) ->
     """Give times, their unit, and what they are called."""
     first, n_samples = chosen[0], len(chosen[0].values)
     if keys.time_column:
-        time = find_signal(table, keys.time_column)
+        time = find_signal(table, keys.time_column, key="time_column")
         _require_same_length(table, first, time)
         times, unit, name = time.values, time.unit, time.name
     elif first.time is not None:

@@ -95,7 +95,7 @@ def find_columns(layout: TextLayout, keys: TableKeys, *, columns: Sequence[str] 
     taken = {index for index, name in enumerate(names) if name in columns or name_and_unit(name)[0] in columns}
     counts_samples = _counts_samples(layout, names, units, 0) and 0 not in taken
     if keys.time_column:
-        time: int | None = column_index(layout, names, keys.time_column)
+        time: int | None = column_index(layout, names, keys.time_column, key="time_column")
     else:
         time = _find_time(layout, names, units, taken, counts_samples=counts_samples)
     holds_stamps = time is not None and is_stamp(layout.rows[0][time])

@@ -36,7 +36,7 @@ LINES_AT_ONCE = 10_000
 LET_GO_S, PAUSE_S = 1.0, 1e-4  # at most, for threads of pyarrow to drop what they have read; between two looks
 
 
-def column_index(layout: TextLayout, names: Sequence[str], column: str) -> int:
+def column_index(layout: TextLayout, names: Sequence[str], column: str, *, key: str = "column") -> int:
     """Find a column by its name, with or without the unit in brackets behind it.
 
     Parameters
@@ -47,6 +47,8 @@ def column_index(layout: TextLayout, names: Sequence[str], column: str) -> int:
         The header.
     column : str
         The name.
+    key : str
+        Of the test that names it.
 
     Returns
     -------
@@ -65,16 +67,17 @@ def column_index(layout: TextLayout, names: Sequence[str], column: str) -> int:
         indices = [int(column) - 1]
     if not indices:
         known = [name for name in names if name]
-        where = f"line {max(layout.n_before, 1)}"
+        where, asked = f"line {max(layout.n_before, 1)}", "" if key == "column" else f", which {key} names"
+        lacks = f"has no column '{column}'{asked}"
         if CONTROL.search("".join(known)):
-            problem = f"has no column '{column}', and its names are not in UTF-8; save it as UTF-8, or write the number"
-            raise FileFormatError(layout.path, f"{problem} of the column, as in column = 2", where=where)
-        raise FileFormatError(layout.path, f"has no column '{column}'; {did_you_mean(column, known)}", where=where)
+            problem = f"{lacks}, and its names are not in UTF-8; save it as UTF-8, or write the number"
+            raise FileFormatError(layout.path, f"{problem} of the column, as in {key} = 2", where=where)
+        raise FileFormatError(layout.path, f"{lacks}; {did_you_mean(column, known)}", where=where)
     if len(indices) > 1:
         raise FileFormatError(
             layout.path,
             f"has {len(indices)} columns '{column}'; give each its own name, or write the column's number, as in "
-            f"column = {indices[0] + 1}",
+            f"{key} = {indices[0] + 1}",
         )
     return indices[0]
 

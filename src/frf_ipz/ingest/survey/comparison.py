@@ -157,11 +157,11 @@ def _compare_setup(
         for output, comparison in enumerate(comparisons):
             if comparison is not None and named.get(output) == UNNAMED:
                 if (impact, output) in losses:
-                    named[output] = f"{CONTRADICTS}: {_say_lost(survey, losses[impact, output])}"
+                    named[output] = f"{CONTRADICTS}: {_say_lost(survey, losses[impact, output], records[impact])}"
                     continue
                 agreeing = [records[number] for number in comparison.agreeing]
                 lost = _find_lost(files, survey, agreeing, records[impact], output)
-                explained = _explain(survey, spectra, comparison, (impact, output), lost)
+                explained = _explain(survey, spectra, comparison, (impact, output), lost, records[impact])
                 if not explained:
                     unlike.add((impact, output))
                 named[output] = f"{CONTRADICTS}: {explained or _difference(spectra, comparison, (impact, output))}"
@@ -448,6 +448,7 @@ def _explain(
     comparison: OutputComparison,
     place: tuple[int, int],
     lost_samples: LostSamples,
+    record: RecordInfo,
 ) -> str:
     """Say what fault makes one response of an impact contradict those of the others; empty where none does."""
     impact, output = place
@@ -460,13 +461,17 @@ def _explain(
     scaled = comparison.misfit(force, response / factor, noise) if factor else misfit
     is_lost = lost and (share <= DISAGREE**2 or comparison.explains(misfit, max(misfit * share, 1.0), 1))
     if is_lost and not scaled < misfit * share:
-        return _say_lost(survey, lost_samples)
+        return _say_lost(survey, lost_samples, record)
     if comparison.explains(misfit, scaled, 1):
         return f"it is {abs(factor):.3g} times as large"
     return ""
 
 
-def _say_lost(survey: Survey, loss: LostSamples) -> str:
+def _say_lost(survey: Survey, loss: LostSamples, record: RecordInfo) -> str:
+    if loss.start <= record.trigger + abs(loss.lost):  # of what came before, nothing shows where it stood
+        late = "earlier" if loss.lost > 0 else "later"
+        shift_ms = 1e3 * abs(loss.lost) * survey.step_s
+        return f"it comes {abs(loss.lost)} samples ({shift_ms:.3g} ms) {late} after its force than in the others"
     what = f"{abs(loss.lost)} samples {'are lost' if loss.lost > 0 else 'came in'}"
     return f"{what} {loss.start * survey.step_s:.4g} s after its beginning"
 
