@@ -271,6 +271,28 @@ def errors_of_arithmetic(what: str, *, advice: str = UNITS_OF_MODEL) -> Iterator
         ) from None
 
 
+def problem_of(error: FrfIpzError) -> str:
+    """Give what is wrong, without the file and what to do, where another way out has to be proposed.
+
+    Parameters
+    ----------
+    error : FrfIpzError
+        What was met.
+
+    Returns
+    -------
+    str
+        The first part of its message.
+
+    Examples
+    --------
+    >>> problem_of(FileFormatError("frf.npz", "holds no FRFs; export it again"))
+    'holds no FRFs'
+    """
+    text = error.problem if isinstance(error, FileFormatError) else str(error)
+    return text.partition(";")[0]
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Propose the known word that is closest to an unknown one.
 

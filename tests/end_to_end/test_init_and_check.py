@@ -389,6 +389,23 @@ def test_the_skeleton_without_its_comments_is_a_model(campaign, kind):
     assert read_model(path).kind == kind
 
 
+def test_init_leaves_out_a_reference_that_does_not_say_what_it_connects(campaign):
+    lines = np.arange(1.0, 200.0)
+    np.savez(campaign / "truth.npz", f=lines, H=np.exp(1j * lines))
+    for name in ("test", "pipeline"):
+        (campaign / f"{name}.toml").unlink()
+    write_starting_files(campaign)
+    path = campaign / "pipeline.toml"
+    text = path.read_text()
+    assert re.search(r"# reference = .truth\.npz. +# no reference as it is: holds FRFs in 'H', 1 outputs x 1", text)
+    assert read_inputs(path).reference is None
+    path.write_text(text.replace("# reference", "reference"))
+    with pytest.raises(
+        InputError, match=r"pipeline\.toml, key 'predict\.reference': truth\.npz holds .* or leave it out"
+    ):
+        read_inputs(path)
+
+
 def test_init_takes_frfs_beside_recordings_for_a_reference(campaign):
     (campaign / "kept.csv").write_text(
         "frequency_hz,output_dof,input_dof,real,imag\n1,11:+z,15:+z,0.1,0.01\n2,11:+z,15:+z,1,0.1\n", encoding="utf-8"

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
 from frf_ipz.dofs import AnyDof, bind_port, parse_label
-from frf_ipz.errors import FileFormatError, InputError, errors_of_file
+from frf_ipz.errors import FileFormatError, InputError, errors_of_file, problem_of
 from frf_ipz.fe.changes import with_default_damping, with_point_masses
 from frf_ipz.fe.model_file import model_files, read_model
 from frf_ipz.ingest.campaign_file import bind_ports, read_test
@@ -179,7 +179,7 @@ def _read_inputs(path: Path, ledger: Ledger, shared: SharedModel | None) -> Pipe
         digests={str(file): digest_file(file) for file in dict.fromkeys(files)},
         measurement_names=tuple(str(file) for file in test.files),
         model_names=tuple(str(file) for file in files_of_model),
-        reference=None if aside is None else read_frfs(aside, quantity=test.labels[0].quantity),
+        reference=None if aside is None else _read_reference(aside, test, pipeline),
         reference_name="" if aside is None else str(aside),
         ledger=ledger,
         shared=shared,
@@ -222,6 +222,18 @@ def _read_test(pipeline: Pipeline) -> VibrationTest:
         return without_sensors(test, pipeline.file.ingest.hide)
     except InputError as error:
         raise FileFormatError(pipeline.path, str(error), where="key 'ingest.hide'") from None
+
+
+def _read_reference(path: Path, test: VibrationTest, pipeline: Pipeline) -> FrfSet:
+    """Read the FRFs that a prediction is held against; their file says all itself, as no ``[[frf]]`` does."""
+    try:
+        return read_frfs(path, quantity=test.labels[0].quantity)
+    except FileFormatError as error:
+        if "[[frf]]" not in error.problem:
+            raise
+        problem = f"{path.name} {problem_of(error)}; a reference says itself what its FRFs connect, and their unit"
+        way_out = "write it to CSV in SI with frequency_hz, output_dof, input_dof, real, imag, or leave it out"
+        raise FileFormatError(pipeline.path, f"{problem}: {way_out}", where="key 'predict.reference'") from None
 
 
 def _read_points(pipeline: Pipeline, ports: Mapping[PortDof, PortDof]) -> tuple[AnyDof, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from frf_ipz.errors import FrfIpzError
+from frf_ipz.errors import FrfIpzError, problem_of
 from frf_ipz.ingest.formats.frf_file import FrfSource
 from frf_ipz.ingest.formats.registry import read_frf_file
 from frf_ipz.pipeline.init.text import HEAD, guessed, quoted, with_comment
@@ -57,17 +57,25 @@ def _prediction(contents: FolderContents, *, has_model: bool) -> list[str]:
     if not contents.references:
         return [*lines, with_comment("points = []", 'points of interest, never measured, e.g. ["49:+z"]')]
     reference = contents.references[0]
-    points = f"points = [{', '.join(quoted(dof) for dof in _output_dofs(reference))}]"
-    key = f"reference = {quoted(contents.name(reference))}"
+    dofs, problem = _output_dofs(reference)
+    points = f"points = [{', '.join(quoted(dof) for dof in dofs)}]"
+    key, what = f"reference = {quoted(contents.name(reference))}", "FRFs kept aside, to judge by"
+    if problem:
+        key, what = f"# {key}", f"no reference as it is: {problem}"
     if not has_model:
-        points, key = f"# {points}", f"# {key}"
-    lines += [guessed(points, "points of interest, never measured"), guessed(key, "FRFs kept aside, to judge by")]
+        points, key = f"# {points}", f"# {key.removeprefix('# ')}"
+    lines += [guessed(points, "points of interest, never measured"), guessed(key, what)]
     return [*lines, *(f"# {quoted(contents.name(path))} holds FRFs too" for path in contents.references[1:])]
 
 
-def _output_dofs(reference: Path) -> list[str]:
-    try:
-        frfs = read_frf_file(FrfSource(path=reference, quantity=FrfQuantity.ACCELERANCE))
-    except FrfIpzError:  # check says what is wrong with it
-        return []
-    return list(dict.fromkeys(str(frf.label.output_dof) for frf in frfs))
+def _output_dofs(reference: Path) -> tuple[list[str], str]:
+    """Give the sensors of a reference, or why it cannot be one: no ``[[frf]]`` says what its file does not."""
+    problem = ""
+    for quantity in FrfQuantity:  # that of the test is not known yet
+        try:
+            frfs = read_frf_file(FrfSource(path=reference, quantity=quantity))
+        except FrfIpzError as error:
+            problem = problem or problem_of(error)
+        else:
+            return list(dict.fromkeys(str(frf.label.output_dof) for frf in frfs)), ""
+    return [], problem
