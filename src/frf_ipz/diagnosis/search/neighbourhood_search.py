@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -169,9 +169,10 @@ def _search_neighbourhood(
         component = fit.hypothesis.components[-1]
         neighbours = component.effect.neighbours(problem.context, component.location)
         beside = [location for location in neighbours if worth_fitting(replace(component, location=location))]
+        known = set(fits)
         better = _best_of_locations(problem, base, fit, beside, fits)
         if better is fit:
-            _continue_unfinished(problem, base, fit, beside, fits)
+            _continue_unfinished(problem, base, fit, beside, fits, known)
             better = _best_of_locations(problem, base, fit, beside, fits)
         if better is fit and fit.is_nearly_right:
             better = _best_of_locations(problem, base, fit, _promising_surroundings(problem, fit), fits)
@@ -181,18 +182,24 @@ def _search_neighbourhood(
 
 
 def _continue_unfinished(
-    problem: InferenceProblem, base: Fit, fit: Fit, locations: Sequence[Location], fits: Fits
+    problem: InferenceProblem,
+    base: Fit,
+    fit: Fit,
+    locations: Sequence[Location],
+    fits: Fits,
+    known: Container[ComponentKey],
 ) -> None:
     """Continue fits of neighbours that were stopped early: small steps may lead far down.
 
-    Where they do not, the values and the nuisance at the best location may be the better start.
+    Where they do not, the values and the nuisance at the best location may be the better start: for those that were
+    known before; the others began there.
     """
     for component in (replace(fit.hypothesis.components[-1], location=location) for location in locations):
-        known = fits[component.key]
-        if known.has_converged or known.cost >= COST_RATIO * fit.cost + MAX_BEHIND_COMPLETE:
+        unfinished = fits[component.key]
+        if unfinished.has_converged or unfinished.cost >= COST_RATIO * fit.cost + MAX_BEHIND_COMPLETE:
             continue
-        continued = fits[component.key] = problem.fit_to_convergence(known)
-        if continued.cost > fit.cost:
+        continued = fits[component.key] = problem.fit_to_convergence(unfinished)
+        if continued.cost > fit.cost and component.key in known:
             anew = fit_from_neighbour(problem, base, component, fit, find_cost_limit(fits.values()))
             fits[component.key] = max(continued, anew, key=lambda candidate: candidate.log_evidence)
 
