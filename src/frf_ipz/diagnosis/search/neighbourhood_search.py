@@ -175,7 +175,12 @@ def _search_neighbourhood(
             _continue_unfinished(problem, base, fit, beside, fits, known)
             better = _best_of_locations(problem, base, fit, beside, fits)
         if better is fit and fit.is_nearly_right:
-            better = _best_of_locations(problem, base, fit, _promising_surroundings(problem, fit), fits)
+            around = [
+                location
+                for location in _promising_surroundings(problem, fit)
+                if worth_fitting(replace(component, location=location))
+            ]
+            better = _best_of_locations(problem, base, fit, around, fits)
         if better is fit:
             return
         fit = better
