@@ -43,7 +43,7 @@ class ModalStiffness:
     @property
     def n_coupled(self) -> int:
         """Number of modes that damping couples, r."""
-        return self.coupling.shape[1]
+        return int(self.coupling.shape[1])
 
     def at(self, points: IntArray) -> ModalStiffness:
         """Give the dynamic stiffness at some points of the contour, by an (n,) int array."""

@@ -18,6 +18,7 @@ from frf_ipz.diagnosis.search.neighbourhood_search import (
     Fits,
     evaluate_without_fit,
     find_cost_limit,
+    may_be_as_good,
     refine_surroundings,
     search_neighbourhoods,
 )
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.evidence.hypothesis import Component
 
+AMBIGUOUS = 8.0  # log Bayes factor behind the best: what is so near is compared more closely
 N_SCORED = 14  # hypotheses that are fitted after the score test
 MIN_PROMISE = 5.0  # log-likelihood that a linear step promises: with less, a hypothesis is not fitted
 MIN_PROMISED_COST = 0.3  # of the cost of a fit far off: with less, a small effect is not what it lacks
@@ -117,7 +119,9 @@ def fit_null_model(problem: InferenceProblem) -> Fit:
     return problem.fit((), np.zeros(0))
 
 
-def search_component(problem: InferenceProblem, base: Fit, *, good_cost: float = np.inf) -> Ranking:
+def search_component(
+    problem: InferenceProblem, base: Fit, *, good_cost: float = np.inf, min_log_bayes_factor: float = 0.0
+) -> Ranking:
     """Search for one more component.
 
     Parameters
@@ -129,6 +133,8 @@ def search_component(problem: InferenceProblem, base: Fit, *, good_cost: float =
     good_cost : float
         Cost of a fit that leaves nothing to explain. Where no component is likely to get there, nor to explain a
         considerable part, none is fitted exactly.
+    min_log_bayes_factor : float
+        What explains less counts for nothing, where the base explains nearly all: its neighbours are not fitted.
 
     Returns
     -------
@@ -141,7 +147,7 @@ def search_component(problem: InferenceProblem, base: Fit, *, good_cost: float =
         If there was time for none.
     """
     n_tried, scanned, refined, is_complete = 0, list[Start](), list[Start](), True
-    worth_fitting = _is_worth_fitting
+    worth_fitting: Callable[[Component], bool] = may_be_as_good
     fits: Fits = {}
     try:
         if not base.explains_nearly_all:
@@ -158,7 +164,8 @@ def search_component(problem: InferenceProblem, base: Fit, *, good_cost: float =
             n_tried += len(scored)
             _add_by_score_test(problem, base, scored, good_cost, fits)
             if base.explains_nearly_all:
-                worth_fitting = _promising(scored, PROMISED_PART * _gain(base, fits), effects.score)
+                least = PROMISED_PART * max(_gain(base, fits), min_log_bayes_factor)
+                worth_fitting = _promising(scored, least, effects.score, AMBIGUOUS)
         if fits and (n_effects := _count_searched_effects(base, fits, good_cost)):
             search_neighbourhoods(problem, base, fits, n_effects, worth_fitting)
         ranked = rank_fits(problem, fits.values())
@@ -228,7 +235,7 @@ def search_small_component(problem: InferenceProblem, base: Fit, min_log_bayes_f
         _fit_and_keep(problem, base, start, fits)
     gain = _gain(base, fits)
     if gain > PROMISED_PART * min_log_bayes_factor:
-        worth_fitting = _promising(scored, PROMISED_PART * gain, effects.score)
+        worth_fitting = _promising(scored, PROMISED_PART * gain, effects.score, GAIN)
         search_neighbourhoods(problem, base, fits, _count_searched_effects(base, fits), worth_fitting)
     return Ranking(base=base, fits=rank_fits(problem, fits.values()), n_tried=len(scored))
 
@@ -243,27 +250,22 @@ def _gain(base: Fit, fits: Fits) -> float:
     return max((fit.log_evidence for fit in fits.values()), default=-np.inf) - base.log_evidence
 
 
-def _is_worth_fitting(_: Component) -> bool:
-    """Say that any component may be: where much is left, a small step tells little."""
-    return True
-
-
 def _promising(
-    scored: Iterable[Start], min_gain: float, score: Callable[[Sequence[Component]], list[Start]]
+    scored: Iterable[Start], min_gain: float, score: Callable[[Sequence[Component]], list[Start]], behind: float
 ) -> Callable[[Component], bool]:
-    """Say which components may gain so much: of each effect the best that promise it.
+    """Say which components may gain so much: of each effect those that promise it and are not far behind the best.
 
     Small effects act linearly: a location that promises less than another of the same effect is no better. What was
     passed over, as places between others are, is scored when it is asked for.
     """
     scored = list(scored)
-    highest = {name: min(max_cost, -min_gain) for name, max_cost in _best_costs(scored).items()}
+    highest = _best_costs(scored)
     costs = {start.component.key: start.cost for start in scored}
 
     def is_promising(component: Component) -> bool:
         if component.key not in costs:
             costs[component.key] = min((start.cost for start in score([component])), default=np.inf)
-        return costs[component.key] <= highest.get(component.effect.name, -min_gain) + GAIN
+        return costs[component.key] <= min(highest.get(component.effect.name, np.inf) + behind, -min_gain)
 
     return is_promising
 

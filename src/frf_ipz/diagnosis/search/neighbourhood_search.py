@@ -50,12 +50,17 @@ def find_cost_limit(fits: Iterable[Fit]) -> float:
     return COMPLETE_COST_RATIO * best.cost + MAX_BEHIND_COMPLETE
 
 
+def may_be_as_good(_: Component) -> bool:
+    """Say of any component that it may be as good: where much is left, what a small step promises tells little."""
+    return True
+
+
 def search_neighbourhoods(
     problem: InferenceProblem,
     base: Fit,
     fits: Fits,
     n_effects: int = N_EFFECTS,
-    worth_fitting: Callable[[Component], bool] = lambda _: True,
+    worth_fitting: Callable[[Component], bool] = may_be_as_good,
 ) -> None:
     """Search the neighbourhoods of the best effects, as long as that makes them more probable.
 
