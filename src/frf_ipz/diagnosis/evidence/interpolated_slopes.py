@@ -13,7 +13,7 @@ Sci. Comput. 38 (2016) A631-A648.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ import numpy as np
 from scipy import linalg
 from scipy.linalg import blas
 
-from frf_ipz.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from frf_ipz.arrays import ComplexArray, FloatArray, IntArray
 from frf_ipz.diagnosis.model.response import Response, nuisance_jacobian
 
 if TYPE_CHECKING:
@@ -45,14 +45,6 @@ class WhitenedSlopes:
     """
 
     columns: FloatArray
-
-    def select(self, used: BoolArray) -> WhitenedSlopes:
-        """Select derivatives by an (n,) bool array."""
-        return WhitenedSlopes(self.columns[:, used])
-
-    def squares(self) -> FloatArray:
-        """Squared norms of the derivatives, (n,) array."""
-        return np.asarray(np.sum(self.columns**2, axis=0))
 
     def products(self) -> FloatArray:
         """Products of the derivatives with each other, (n, n) array."""
@@ -86,28 +78,6 @@ class InterpolatedSlopes:
     directions: ComplexArray
     columns: FloatArray
     shared: tuple[FloatArray, ...]
-
-    def select(self, used: BoolArray) -> InterpolatedSlopes:
-        """Select derivatives.
-
-        Parameters
-        ----------
-        used : (n,) bool array
-            Which ones.
-
-        Returns
-        -------
-        InterpolatedSlopes
-            Those.
-        """
-        return replace(self, columns=np.ascontiguousarray(self.columns[:, :, used]))
-
-    def squares(self) -> FloatArray:
-        """Squared norms of the derivatives, (n,) array."""
-        squares = np.einsum("fkn,fkn->n", self.columns, self.columns)
-        for removed in self._removed():
-            squares -= np.einsum("rn,rn->n", removed, removed)
-        return np.asarray(squares)
 
     def products(self) -> FloatArray:
         """Products of the derivatives with each other, (n, n) array."""
@@ -203,21 +173,21 @@ def interpolate_slopes(
     points, functions = choose_points(response, nuisance_prior, data.measured.size)
     jacobian = nuisance_jacobian(response.receptances_at(points), nuisance_prior, layout)
     gains = data.gains(response)
-    directions, columns = [], []
+    n_functions, n_frfs = functions.shape[1], len(data.whitening.factors)
+    directions = np.empty((n_frfs, *functions.shape), np.complex128)
+    columns = np.empty((n_frfs, 2 * n_functions, nuisance_prior.size))
     for frf, factor in enumerate(data.whitening.factors):
         raw = (np.sqrt(2.0) * gains[frf] * response.chain[:, frf])[:, None] * functions
         white = blas.ztrmm(1.0, factor.T, raw, lower=0, trans_a=1)
-        orthonormal, triangle = linalg.qr(white, mode="economic", check_finite=False)
-        directions.append(orthonormal)
+        directions[frf], triangle = linalg.qr(white, mode="economic", check_finite=False)
         along = triangle @ jacobian[:, frf]
-        columns.append(np.concatenate([along.real, along.imag]))
-    all_directions = np.array(directions, np.complex128)
+        columns[frf, :n_functions], columns[frf, n_functions:] = along.real, along.imag
     shared = []
     for frfs, of_errors, _ in data.whitening.blocks:
         parts = of_errors.reshape(len(frfs), 2, len(response.s), -1)
-        shared.append(_along(all_directions[frfs], parts[:, 0] + 1j * parts[:, 1]))
+        shared.append(_along(directions[frfs], parts[:, 0] + 1j * parts[:, 1]))
     return InterpolatedSlopes(
-        data=data, response=response, directions=all_directions, columns=np.array(columns), shared=tuple(shared)
+        data=data, response=response, directions=directions, columns=columns, shared=tuple(shared)
     )
 
 

@@ -172,16 +172,16 @@ class _MapProblem:
             squares.append((after.modes.squares[:m] - before.modes.squares[:m]) / step)
             ratios.append((after.modes.stated_ratio[:m] - before.modes.stated_ratio[:m]) / step)
         slopes = differentiate_by_nuisance(data, point.response, hypothesis.nuisance_prior, hypothesis.context.layout)
-        used = slopes.squares() > MIN_INFLUENCE
-        slopes = slopes.select(used)
+        products = slopes.products()
+        used = np.diag(products) > MIN_INFLUENCE
         n_data = len(point.misfit)
         by_parameters = data.slopes(point.response, np.dstack(changes)) if changes else np.zeros((n_data, 0))
-        across = slopes.products_with(np.column_stack([by_parameters, point.misfit]))
+        across = slopes.products_with(np.column_stack([by_parameters, point.misfit]))[used]
         prior = np.concatenate([PRIOR_CURVATURE / (hypothesis.high - hypothesis.low) ** 2, point.slopes[used] ** 2])
         right = np.concatenate([by_parameters.T @ point.misfit, across[:, -1]])
         right[n_parameters:] -= (point.whitened_nuisance * point.slopes)[used]
         between = across[:, :-1]
-        matrix = np.block([[by_parameters.T @ by_parameters, between.T], [between, slopes.products()]])
+        matrix = np.block([[by_parameters.T @ by_parameters, between.T], [between, products[np.ix_(used, used)]]])
         return _Linearisation(
             matrix=matrix + np.diag(prior),
             right=right,

@@ -33,35 +33,45 @@ class ModalStiffness:
     ----------
     diagonal : (n_points, q) complex array
         Of each mode.
-    coupling : (n_points, r, r) complex array, optional
-        What damping couples the first modes by.
+    coupling : (n_points, r, r) complex array
+        What damping couples the first modes by; r is 0 where it couples none.
     """
 
     diagonal: ComplexArray
-    coupling: ComplexArray | None
+    coupling: ComplexArray
+
+    @property
+    def n_coupled(self) -> int:
+        """Number of modes that damping couples, r."""
+        return int(self.coupling.shape[1])
 
     def at(self, points: IntArray) -> ModalStiffness:
         """Give the dynamic stiffness at some points of the contour, by an (n,) int array."""
-        coupling = None if self.coupling is None else self.coupling[points]
-        return ModalStiffness(diagonal=self.diagonal[points], coupling=coupling)
+        return ModalStiffness(diagonal=self.diagonal[points], coupling=self.coupling[points])
 
     def move(self, loads: FloatArray) -> ComplexArray:
         """Give the modal motion under loads, (n_loads, q): (n_points, q, n_loads) complex array."""
-        if self.coupling is None:
-            return np.asarray(loads.T[None] / self.diagonal[:, :, None])
-        r = self.coupling.shape[1]
-        dynamic = self.coupling + self.diagonal[:, :r, None] * np.eye(r)
+        r = self.n_coupled
         motion = np.empty((*self.diagonal.shape, len(loads)), np.complex128)
-        motion[:, :r] = np.linalg.solve(dynamic, np.broadcast_to(loads[:, :r].T, (len(dynamic), r, len(loads))))
+        if r:
+            motion[:, :r] = self._move_coupled(loads)
         motion[:, r:] = loads[:, r:].T / self.diagonal[:, r:, None]
         return motion
 
     def receptances(self, motions: FloatArray, loads: FloatArray) -> ComplexArray:
         """Give motions, (n_motions, q), under loads, (n_loads, q): (n_points, n_motions, n_loads) complex array."""
-        if self.coupling is not None:
-            return np.asarray(motions @ self.move(loads))
-        products = (motions[:, None] * loads).reshape(-1, motions.shape[1])  # for all, without the modes' motion
-        return (1 / self.diagonal @ products.T).reshape(len(self.diagonal), len(motions), len(loads))
+        r = self.n_coupled
+        products = (motions[:, None, r:] * loads[:, r:]).reshape(len(motions) * len(loads), motions.shape[1] - r)
+        across = (1 / self.diagonal[:, r:] @ products.T).reshape(len(self.diagonal), len(motions), len(loads))
+        if r:  # real motions of real and imaginary parts: half the work
+            across += (motions[:, :r] @ self._move_coupled(loads).view(np.float64)).view(np.complex128)
+        return across
+
+    def _move_coupled(self, loads: FloatArray) -> ComplexArray:
+        """Give the motion of the modes that are coupled, (n_points, r, n_loads) complex array."""
+        r = self.n_coupled
+        dynamic = self.coupling + self.diagonal[:, :r, None] * np.eye(r)
+        return np.asarray(np.linalg.solve(dynamic, np.broadcast_to(loads[:, :r].T, (len(dynamic), r, len(loads)))))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -169,11 +179,13 @@ def respond(
     motions = [attachment.motions for attachment in change.attachments]
     attached = np.hstack(motions).T @ basis.vectors @ modes.vectors if motions else np.zeros((0, len(modes.omega)))
     stiffness = _modal_stiffness(modes, _modulus(change, modes, s), s)
-    attached_stiffness = _coupled_stiffness(stiffness.receptances(attached, attached), change, s)
-    receptance = stiffness.receptances(outputs, inputs)
+    n_outputs, n_inputs = len(outputs), len(inputs)
+    across = stiffness.receptances(np.vstack([outputs, attached]), np.vstack([inputs, attached]))  # solved for once
+    receptance = across[:, :n_outputs, :n_inputs]
+    attached_stiffness = _coupled_stiffness(across[:, n_outputs:, n_inputs:], change, s)
     if motions:
-        free_motion = stiffness.receptances(attached, inputs)
-        receptance = receptance - stiffness.receptances(outputs, attached) @ (attached_stiffness @ free_motion)
+        free_motion = across[:, n_outputs:, :n_inputs]
+        receptance = receptance - across[:, :n_outputs, n_inputs:] @ (attached_stiffness @ free_motion)
     chain = (
         s[:, None] ** layout.power * _channels(change, layout, s) * np.exp(layout.gain_signs @ nuisance_values.gains)
     )
@@ -209,8 +221,8 @@ def _modulus(change: Change, modes: Modes, s: ComplexArray) -> ComplexArray:
 def _modal_stiffness(modes: Modes, modulus: ComplexArray, s: ComplexArray) -> ModalStiffness:
     damping = 2 * modes.ratio * np.sqrt(np.abs(modes.squares))
     diagonal = s[:, None] ** 2 + s[:, None] * damping + modulus * modes.squares
-    coupling = None if modes.viscous is None else s[:, None, None] * modes.viscous
-    return ModalStiffness(diagonal=diagonal, coupling=coupling)
+    viscous = np.zeros((0, 0)) if modes.viscous is None else modes.viscous
+    return ModalStiffness(diagonal=diagonal, coupling=s[:, None, None] * viscous)
 
 
 def _coupled_stiffness(receptance: ComplexArray, change: Change, s: ComplexArray) -> ComplexArray:

@@ -22,7 +22,7 @@ import numpy as np
 
 from frf_ipz.diagnosis.evidence.inference_problem import compute_weights, make_data
 from frf_ipz.diagnosis.evidence.map_fit import adopt_modes, fit_map
-from frf_ipz.diagnosis.search.component_search import Ranking, keep_better, rank_fits
+from frf_ipz.diagnosis.search.component_search import AMBIGUOUS, Ranking, keep_better, rank_fits
 from frf_ipz.diagnosis.search.global_scan import scan_globally
 from frf_ipz.diagnosis.search.neighbourhood_search import (
     Fits,
@@ -47,7 +47,6 @@ EQUAL_COST_RATIO = 1.1  # times the best cost there: locations as good as the be
 MAX_EQUAL = 4  # such locations
 PARTS = (0.3, 0.1)  # of the tolerances of stiffness, mass and frequencies
 FLOORS = (0.3, 0.1)  # parts of the errors of FRFs that no parameter stands for
-AMBIGUOUS = 8.0  # log Bayes factor behind the best: what is so near is rescored
 CANDIDATES_PER_EFFECT, MAX_CANDIDATES = 8, 24  # locations of one effect that are rescored, and of all effects
 NEIGHBOURS_WITHIN = 4.0  # log Bayes factor behind the best rescored fit: neighbours of these are rescored too
 MAX_NEIGHBOURS = 30  # that are rescored

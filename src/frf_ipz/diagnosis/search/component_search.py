@@ -18,6 +18,7 @@ from frf_ipz.diagnosis.search.neighbourhood_search import (
     Fits,
     evaluate_without_fit,
     find_cost_limit,
+    may_be_as_good,
     refine_surroundings,
     search_neighbourhoods,
 )
@@ -31,7 +32,7 @@ from frf_ipz.diagnosis.search.robust_refinement import (
     refine_starts,
     select_apart,
 )
-from frf_ipz.diagnosis.search.score_tests import run_score_test
+from frf_ipz.diagnosis.search.score_tests import prepare_small_effects
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.evidence.hypothesis import Component
 
+AMBIGUOUS = 8.0  # log Bayes factor behind the best: what is so near is compared more closely
 N_SCORED = 14  # hypotheses that are fitted after the score test
 MIN_PROMISE = 5.0  # log-likelihood that a linear step promises: with less, a hypothesis is not fitted
 MIN_PROMISED_COST = 0.3  # of the cost of a fit far off: with less, a small effect is not what it lacks
@@ -117,7 +119,9 @@ def fit_null_model(problem: InferenceProblem) -> Fit:
     return problem.fit((), np.zeros(0))
 
 
-def search_component(problem: InferenceProblem, base: Fit, *, good_cost: float = np.inf) -> Ranking:
+def search_component(
+    problem: InferenceProblem, base: Fit, *, good_cost: float = np.inf, min_log_bayes_factor: float = 0.0
+) -> Ranking:
     """Search for one more component.
 
     Parameters
@@ -129,6 +133,8 @@ def search_component(problem: InferenceProblem, base: Fit, *, good_cost: float =
     good_cost : float
         Cost of a fit that leaves nothing to explain. Where no component is likely to get there, nor to explain a
         considerable part, none is fitted exactly.
+    min_log_bayes_factor : float
+        What explains less counts for nothing, where the base explains nearly all: its neighbours are not fitted.
 
     Returns
     -------
@@ -141,6 +147,7 @@ def search_component(problem: InferenceProblem, base: Fit, *, good_cost: float =
         If there was time for none.
     """
     n_tried, scanned, refined, is_complete = 0, list[Start](), list[Start](), True
+    worth_fitting: Callable[[Component], bool] = may_be_as_good
     fits: Fits = {}
     try:
         if not base.explains_nearly_all:
@@ -152,9 +159,15 @@ def search_component(problem: InferenceProblem, base: Fit, *, good_cost: float =
                 _add_beside_nuisance(problem, base, fits)
         if base.is_nearly_right or not (base.is_far_off or any(fit.explains_nearly_all for fit in fits.values())):
             # from far off, what a linear step promises is no match
-            n_tried += _add_by_score_test(problem, base, good_cost, fits)
+            effects = prepare_small_effects(problem, base)
+            scored = effects.score_everywhere()
+            n_tried += len(scored)
+            _add_by_score_test(problem, base, scored, good_cost, fits)
+            if base.explains_nearly_all:
+                least = PROMISED_PART * max(_gain(base, fits), min_log_bayes_factor)
+                worth_fitting = _promising(scored, least, effects.score, AMBIGUOUS)
         if fits and (n_effects := _count_searched_effects(base, fits, good_cost)):
-            search_neighbourhoods(problem, base, fits, n_effects)
+            search_neighbourhoods(problem, base, fits, n_effects, worth_fitting)
         ranked = rank_fits(problem, fits.values())
     except DeadlineError:
         if not fits:
@@ -216,12 +229,13 @@ def search_small_component(problem: InferenceProblem, base: Fit, min_log_bayes_f
         Without fits where one linear step promises less of everything.
     """
     fits: Fits = {}
-    scored = run_score_test(problem, base)
+    effects = prepare_small_effects(problem, base)
+    scored = effects.score_everywhere()
     for start in _most_promising(_with_location_prior(scored), PROMISED_PART * min_log_bayes_factor):
         _fit_and_keep(problem, base, start, fits)
-    gain = max((fit.log_evidence for fit in fits.values()), default=-np.inf) - base.log_evidence
+    gain = _gain(base, fits)
     if gain > PROMISED_PART * min_log_bayes_factor:
-        worth_fitting = _promising(scored, PROMISED_PART * gain)
+        worth_fitting = _promising(scored, PROMISED_PART * gain, effects.score, GAIN)
         search_neighbourhoods(problem, base, fits, _count_searched_effects(base, fits), worth_fitting)
     return Ranking(base=base, fits=rank_fits(problem, fits.values()), n_tried=len(scored))
 
@@ -231,14 +245,29 @@ def _with_location_prior(scored: Iterable[Start]) -> list[Start]:
     return [replace(start, cost=start.cost + float(np.log(start.component.n_locations))) for start in scored]
 
 
-def _promising(scored: Iterable[Start], min_gain: float) -> Callable[[Component], bool]:
-    """Say which components may gain so much: those that were not scored, and of each effect the best that promise it.
+def _gain(base: Fit, fits: Fits) -> float:
+    """Give the log Bayes factor of the best fit over the base."""
+    return max((fit.log_evidence for fit in fits.values()), default=-np.inf) - base.log_evidence
 
-    Small effects act linearly: a location that promises less than another of the same effect is no better.
+
+def _promising(
+    scored: Iterable[Start], min_gain: float, score: Callable[[Sequence[Component]], list[Start]], behind: float
+) -> Callable[[Component], bool]:
+    """Say which components may gain so much: of each effect those that promise it and are not far behind the best.
+
+    Small effects act linearly: a location that promises less than another of the same effect is no better. What was
+    passed over, as places between others are, is scored when it is asked for.
     """
-    highest = {name: min(max_cost, -min_gain) for name, max_cost in _best_costs(scored).items()}
-    poor = {start.component.key for start in scored if start.cost > highest[start.component.effect.name] + GAIN}
-    return lambda component: component.key not in poor
+    scored = list(scored)
+    highest = _best_costs(scored)
+    costs = {start.component.key: start.cost for start in scored}
+
+    def is_promising(component: Component) -> bool:
+        if component.key not in costs:
+            costs[component.key] = min((start.cost for start in score([component])), default=np.inf)
+        return costs[component.key] <= min(highest.get(component.effect.name, np.inf) + behind, -min_gain)
+
+    return is_promising
 
 
 def _best_costs(scored: Iterable[Start]) -> dict[str, float]:
@@ -250,16 +279,18 @@ def _best_costs(scored: Iterable[Start]) -> dict[str, float]:
     return costs
 
 
-def _add_by_score_test(problem: InferenceProblem, base: Fit, good_cost: float, fits: Fits) -> int:
+def _add_by_score_test(
+    problem: InferenceProblem, base: Fit, scored: Sequence[Start], good_cost: float, fits: Fits
+) -> None:
     """Fit small effects from the base, if one linear step promises something, and enough to be of use."""
-    scored = run_score_test(problem, base)
+    if base.explains_nearly_all:
+        scored = _with_location_prior(scored)
     promise = MIN_PROMISE if base.is_nearly_right else MIN_PROMISED_COST * base.cost
     starts = _most_promising(scored, max(promise, PROMISED_PART * (base.cost - _useful_cost(base.cost, good_cost))))
     if not starts and base.is_nearly_right:
         starts = _most_promising(scored, -np.inf)[:1]  # to report how little the best one explains
     for start in starts:
         _fit_and_keep(problem, base, start, fits)
-    return len(scored)
 
 
 def _most_promising(scored: Sequence[Start], min_log_bayes_factor: float) -> list[Start]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -50,12 +50,17 @@ def find_cost_limit(fits: Iterable[Fit]) -> float:
     return COMPLETE_COST_RATIO * best.cost + MAX_BEHIND_COMPLETE
 
 
+def may_be_as_good(_: Component) -> bool:
+    """Say of any component that it may be as good: where much is left, what a small step promises tells little."""
+    return True
+
+
 def search_neighbourhoods(
     problem: InferenceProblem,
     base: Fit,
     fits: Fits,
     n_effects: int = N_EFFECTS,
-    worth_fitting: Callable[[Component], bool] = lambda _: True,
+    worth_fitting: Callable[[Component], bool] = may_be_as_good,
 ) -> None:
     """Search the neighbourhoods of the best effects, as long as that makes them more probable.
 
@@ -169,30 +174,42 @@ def _search_neighbourhood(
         component = fit.hypothesis.components[-1]
         neighbours = component.effect.neighbours(problem.context, component.location)
         beside = [location for location in neighbours if worth_fitting(replace(component, location=location))]
+        known = set(fits)
         better = _best_of_locations(problem, base, fit, beside, fits)
         if better is fit:
-            _continue_unfinished(problem, base, fit, beside, fits)
+            _continue_unfinished(problem, base, fit, beside, fits, known)
             better = _best_of_locations(problem, base, fit, beside, fits)
         if better is fit and fit.is_nearly_right:
-            better = _best_of_locations(problem, base, fit, _promising_surroundings(problem, fit), fits)
+            around = [
+                location
+                for location in _promising_surroundings(problem, fit)
+                if worth_fitting(replace(component, location=location))
+            ]
+            better = _best_of_locations(problem, base, fit, around, fits)
         if better is fit:
             return
         fit = better
 
 
 def _continue_unfinished(
-    problem: InferenceProblem, base: Fit, fit: Fit, locations: Sequence[Location], fits: Fits
+    problem: InferenceProblem,
+    base: Fit,
+    fit: Fit,
+    locations: Sequence[Location],
+    fits: Fits,
+    known: Container[ComponentKey],
 ) -> None:
     """Continue fits of neighbours that were stopped early: small steps may lead far down.
 
-    Where they do not, the values and the nuisance at the best location may be the better start.
+    Where they do not, the values and the nuisance at the best location may be the better start: for those that were
+    known before; the others began there.
     """
     for component in (replace(fit.hypothesis.components[-1], location=location) for location in locations):
-        known = fits[component.key]
-        if known.has_converged or known.cost >= COST_RATIO * fit.cost + MAX_BEHIND_COMPLETE:
+        unfinished = fits[component.key]
+        if unfinished.has_converged or unfinished.cost >= COST_RATIO * fit.cost + MAX_BEHIND_COMPLETE:
             continue
-        continued = fits[component.key] = problem.fit_to_convergence(known)
-        if continued.cost > fit.cost:
+        continued = fits[component.key] = problem.fit_to_convergence(unfinished)
+        if continued.cost > fit.cost and component.key in known:
             anew = fit_from_neighbour(problem, base, component, fit, find_cost_limit(fits.values()))
             fits[component.key] = max(continued, anew, key=lambda candidate: candidate.log_evidence)
 

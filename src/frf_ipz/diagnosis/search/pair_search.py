@@ -9,7 +9,7 @@ or a joint, may have stood for both.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -45,10 +45,13 @@ from frf_ipz.diagnosis.search.robust_refinement import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from frf_ipz.arrays import FloatArray
     from frf_ipz.diagnosis.evidence.hypothesis import Component, ComponentKey
+
+PairFits: TypeAlias = "dict[tuple[ComponentKey, ...], Fit]"
+"""Fits of two components, by their keys in turn."""
 
 N_OTHERS = 3  # other first components that are tried where a pair explains all
 N_OTHERS_INCOMPLETE = 5  # the same where it lacks a little
@@ -83,6 +86,7 @@ def search_pair(
         Its base has one component, its fits have two; `first` itself where effects have no location to be paired at.
     """
     rankings: list[Ranking] = []
+    known: PairFits = {}
     if not first.best.is_far_off or not first.refined:
         beside = search_component(problem, first.best, good_cost=good_cost)
         rankings.append(beside)
@@ -97,15 +101,19 @@ def search_pair(
         return first
     best = _most_probable(rankings)
     if best.fits and best.best.mean_misfit <= NEARLY_ALL:
-        best = _reposition(problem, best)
+        for ranking in rankings:
+            _keep_all(known, ranking.fits)
+        best = _reposition(problem, best, known)
         if all(component.effect.has_dynamics for component in best.best.hypothesis.components):
-            best = _try_simpler_effects(problem, best)
+            best = _try_simpler_effects(problem, best, known)
     if not best.best.explains_nearly_all:
         return best
     return _most_probable(
         [
             best,
-            *_search_other_firsts(problem, first, best.best, N_OTHERS if is_good(best.best) else N_OTHERS_INCOMPLETE),
+            *_search_other_firsts(
+                problem, first, best.best, N_OTHERS if is_good(best.best) else N_OTHERS_INCOMPLETE, known
+            ),
         ]
     )
 
@@ -118,15 +126,26 @@ def _most_probable(rankings: list[Ranking]) -> Ranking:
     return best
 
 
-def _search_other_firsts(problem: InferenceProblem, first: Ranking, best: Fit, count: int) -> list[Ranking]:
+def _keep_all(known: PairFits, fits: Iterable[Fit]) -> None:
+    """Keep the better fit of each pair."""
+    for fit in fits:
+        if fit.hypothesis.key not in known or known[fit.hypothesis.key].log_evidence < fit.log_evidence:
+            known[fit.hypothesis.key] = fit
+
+
+def _search_other_firsts(
+    problem: InferenceProblem, first: Ranking, best: Fit, count: int, known: PairFits
+) -> list[Ranking]:
     """Search beside other first components: one with parameters of its own may have stood for both."""
     firsts = [fits[0] for fits in group_by_effect(first.fits)[1 : 1 + count] if fits[0].is_nearly_right]
     rankings = [
         search_small_component(problem, alternative, PROMISED_PART * (best.log_evidence - alternative.log_evidence))
         for alternative in firsts
     ]
+    for pairs in rankings:
+        _keep_all(known, pairs.fits)
     return [
-        _reposition(problem, pairs)
+        _reposition(problem, pairs, known)
         if _is_competitive(pairs.best, best) and not _was_searched_beside(pairs.best, first.best)
         else pairs
         for pairs in rankings
@@ -146,15 +165,15 @@ def _is_competitive(pair: Fit, best: Fit) -> bool:
     return len(pair.hypothesis.components) > 1 and pair.log_evidence > best.log_evidence - COMPETITIVE
 
 
-def _reposition(problem: InferenceProblem, pairs: Ranking) -> Ranking:
+def _reposition(problem: InferenceProblem, pairs: Ranking, known: PairFits) -> Ranking:
     """Step both components of the best pair to better locations: the first was located when it was alone.
 
     Where the first one moves, second ones are searched beside it again.
     """
-    best = _exchange_and_step(problem, _exchange_and_step(problem, pairs.best))
+    best = _exchange_and_step(problem, _exchange_and_step(problem, pairs.best, known), known)
     if best.log_evidence < pairs.best.log_evidence + GAIN:
         return pairs
-    repositioned = _rank_neighbours(problem, best, pairs.n_tried)
+    repositioned = _rank_neighbours(problem, best, pairs.n_tried, known)
     base = repositioned.base
     if base.hypothesis.components[0].key == pairs.base.hypothesis.components[0].key or not base.is_nearly_right:
         return repositioned
@@ -163,16 +182,18 @@ def _reposition(problem: InferenceProblem, pairs: Ranking) -> Ranking:
     )
 
 
-def _try_simpler_effects(problem: InferenceProblem, pairs: Ranking) -> Ranking:
+def _try_simpler_effects(problem: InferenceProblem, pairs: Ranking, known: PairFits) -> Ranking:
     """Try other effects for either component of a pair, and continue from there: dynamics can imitate much."""
     best = pairs.best
     for pair in (best, _exchange(problem, best)):
         simpler = [
-            fits[0] for fits in group_by_effect(_step_last(problem, pair)) if _is_competitive_other(fits[0], pair)
+            fits[0]
+            for fits in group_by_effect(_step_last(problem, pair, known))
+            if _is_competitive_other(fits[0], pair)
         ]
         for candidate in simpler[:MAX_SIMPLER]:
-            best = max(best, _step_in_turn(problem, candidate), key=lambda fit: fit.log_evidence)
-    return pairs if best is pairs.best else _rank_neighbours(problem, best, pairs.n_tried)
+            best = max(best, _step_in_turn(problem, candidate, known), key=lambda fit: fit.log_evidence)
+    return pairs if best is pairs.best else _rank_neighbours(problem, best, pairs.n_tried, known)
 
 
 def _is_competitive_other(fit: Fit, pair: Fit) -> bool:
@@ -180,10 +201,10 @@ def _is_competitive_other(fit: Fit, pair: Fit) -> bool:
     return effect.name != pair_effect.name and _is_competitive(fit, pair)
 
 
-def _rank_neighbours(problem: InferenceProblem, best: Fit, n_tried: int) -> Ranking:
+def _rank_neighbours(problem: InferenceProblem, best: Fit, n_tried: int, known: PairFits) -> Ranking:
     """Rank all neighbours of the last component of a pair."""
     base = problem.fit(best.hypothesis.components[:1], best.values[: best.hypothesis.counts[0]])
-    return Ranking(base=base, fits=rank_fits(problem, _step_last(problem, best)), n_tried=n_tried)
+    return Ranking(base=base, fits=rank_fits(problem, _step_last(problem, best, known)), n_tried=n_tried)
 
 
 def _fit_newest_alone(problem: InferenceProblem, fit: Fit) -> Fit:
@@ -210,9 +231,10 @@ def _search_far_pairs(
     best = max(exact, key=lambda fit: fit.log_evidence)
     if best.cost > cost_to_beat:
         return []
+    known: PairFits = {}
     if not best.is_far_off:
-        best = _exchange_and_step(problem, _exchange_and_step(problem, best))
-    return [_rank_neighbours(problem, best, first.n_tried * len(starts))]
+        best = _exchange_and_step(problem, _exchange_and_step(problem, best, known), known)
+    return [_rank_neighbours(problem, best, first.n_tried * len(starts), known)]
 
 
 def _fit_pairs_roughly(problem: InferenceProblem, pairs: list[tuple[Component, Start]]) -> list[Fit]:
@@ -266,16 +288,16 @@ def _evaluate_unfitted(problem: InferenceProblem, component: Component, values: 
     return fit_map(problem.make_hypothesis((component,)), problem.rough_data, values, iterations=0)
 
 
-def _exchange_and_step(problem: InferenceProblem, fit: Fit) -> Fit:
+def _exchange_and_step(problem: InferenceProblem, fit: Fit, known: PairFits) -> Fit:
     """Exchange the two components and step the new last one to better locations."""
-    return max(_step_last(problem, _exchange(problem, fit)), key=lambda candidate: candidate.log_evidence)
+    return max(_step_last(problem, _exchange(problem, fit), known), key=lambda candidate: candidate.log_evidence)
 
 
-def _step_in_turn(problem: InferenceProblem, fit: Fit) -> Fit:
+def _step_in_turn(problem: InferenceProblem, fit: Fit, known: PairFits) -> Fit:
     """Step both components in turn until neither gains."""
     n_vain = 0
     for _ in range(MAX_TURNS):
-        better = _exchange_and_step(problem, fit)
+        better = _exchange_and_step(problem, fit, known)
         n_vain = n_vain + 1 if better.log_evidence < fit.log_evidence + GAIN else 0
         fit = better
         if n_vain == len(fit.hypothesis.components):
@@ -293,10 +315,15 @@ def _exchange(problem: InferenceProblem, fit: Fit) -> Fit:
     )
 
 
-def _step_last(problem: InferenceProblem, pair: Fit) -> list[Fit]:
-    """Step the last component of a pair to better locations; the pair itself is among the fits."""
+def _step_last(problem: InferenceProblem, pair: Fit, known: PairFits) -> list[Fit]:
+    """Step the last component of a pair to better locations; the pair itself is among the fits.
+
+    A maximum does not depend on where it was found from: pairs that are known are not fitted again.
+    """
     hypothesis = pair.hypothesis
     first = _evaluate_unfitted(problem, hypothesis.components[0], pair.values[: hypothesis.counts[0]])
-    fits: Fits = {hypothesis.components[-1].key: pair}
+    _keep_all(known, [pair])
+    fits: Fits = {fit.hypothesis.components[-1].key: fit for key, fit in known.items() if key[0] == hypothesis.key[0]}
     search_neighbourhoods(problem, first, fits)
+    _keep_all(known, fits.values())
     return list(fits.values())

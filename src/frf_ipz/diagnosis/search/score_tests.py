@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from frf_ipz.arrays import ComplexArray, FloatArray
     from frf_ipz.diagnosis.catalogue.effect import Parameter, Reading, Signature
+    from frf_ipz.diagnosis.catalogue.model_context import ModelContext
     from frf_ipz.diagnosis.evidence.fit import Data, Fit
     from frf_ipz.diagnosis.evidence.hypothesis import Component, Hypothesis
     from frf_ipz.diagnosis.evidence.inference_problem import InferenceProblem
@@ -63,8 +64,8 @@ class ScoreTest:
         Whitened derivatives of the FRFs by the whitened nuisance parameters.
     factor : (n_nuisance, n_nuisance) array
         Lower Cholesky factor of their curvature with its prior.
-    whitened_nuisance : (n_nuisance,) array
-        Of the base.
+    by_nuisance : (n_data,) array
+        What the nuisance of the base changes of the whitened FRFs.
     response : Response
         Of the base.
     """
@@ -75,8 +76,9 @@ class ScoreTest:
     misfit: FloatArray
     columns: FloatArray
     factor: FloatArray
-    whitened_nuisance: FloatArray
+    by_nuisance: FloatArray
     response: Response
+    _shape_scores: list[ShapeScores] = field(init=False, default_factory=list, repr=False)
 
     def change(self, hypothesis: Hypothesis, values: FloatArray) -> ComplexArray:
         """Change of the FRFs by some values, with the nuisance of the base."""
@@ -112,7 +114,7 @@ class ScoreTest:
 
     def without_nuisance(self, values: ComplexArray) -> FloatArray:
         """Whitened misfits of FRFs with the nuisance of the base, as they would be without it, (n_data, n) array."""
-        return np.asarray(self.data.misfits(values) + (self.columns @ self.whitened_nuisance)[:, None])
+        return np.asarray(self.data.misfits(values) + self.by_nuisance[:, None])
 
     def explained_by_nuisance(self, misfits: FloatArray) -> FloatArray:
         """Give what the nuisance explains of misfits, (n_data, n): (n_nuisance, n) array; its squares are taken off."""
@@ -145,6 +147,11 @@ class ScoreTest:
         All that a score needs of a whitened change are products with columns of which there are as many as nuisance
         parameters, and its own square: both are sums over points, whose terms are known before the changes are.
         """
+        if not self._shape_scores:
+            self._shape_scores.append(self._sum_over_points())
+        return self._shape_scores[0]
+
+    def _sum_over_points(self) -> ShapeScores:
         whitening, n_points = self.data.whitening, len(self.data.measured.s)
         explaining = linalg.solve_triangular(self.factor, self.columns.T, lower=True, check_finite=False).T
         columns, by_gains = np.column_stack([explaining, self.misfit]), self.data.gain_directions(self.response)
@@ -273,14 +280,15 @@ def prepare_score_test(problem: InferenceProblem, base: Fit, data: Data) -> Scor
     jacobian = nuisance_jacobian(response, problem.nuisance_prior, problem.context.layout)
     whitened_nuisance, _ = problem.nuisance_prior.whiten(base.nuisance)
     columns = data.slopes(response, jacobian) / _secants(base.nuisance, whitened_nuisance)
+    by_nuisance = columns @ whitened_nuisance
     return ScoreTest(
         problem=problem,
         base=base,
         data=data,
-        misfit=data.misfit(response) + columns @ whitened_nuisance,
+        misfit=data.misfit(response) + by_nuisance,
         columns=columns,
         factor=cholesky_with_prior(columns.T),
-        whitened_nuisance=whitened_nuisance,
+        by_nuisance=by_nuisance,
         response=response,
     )
 
@@ -324,7 +332,6 @@ def free_parameters(test: ScoreTest) -> ScoreTest:
         test,
         columns=columns,
         factor=cholesky_with_prior(columns.T),
-        whitened_nuisance=np.concatenate([test.whitened_nuisance, np.zeros(len(searched))]),
     )
 
 
@@ -335,6 +342,62 @@ def _secants(nuisance: FloatArray, whitened_nuisance: FloatArray) -> FloatArray:
     where the prior rises steeply, would say that a small part of the way is enough.
     """
     return np.divide(whitened_nuisance, nuisance, out=np.ones_like(nuisance), where=nuisance != 0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SmallEffects:
+    """Scores effects as small ones on top of a fit.
+
+    Parameters
+    ----------
+    test : ScoreTest
+        On fewer points, the base's own parameters free.
+    context : ModelContext
+        With the contour of these points.
+    """
+
+    test: ScoreTest
+    context: ModelContext
+
+    def score(self, components: Sequence[Component]) -> list[Start]:
+        """Find the best values of components; the cost is minus the gain in log-likelihood.
+
+        Those whose best size is negative are left out.
+        """
+        shown = show_components(self.context, components)
+        return [
+            *_score_signatures(self.test, list(zip(*shown.signed, strict=True))),
+            *_score_readings(self.test, *shown.read),
+            *(_score_directly(self.test, component) for component in shown.unshown),
+        ]
+
+    def score_everywhere(self) -> list[Start]:
+        """Score all effects at all locations, the most promising first."""
+        problem, context = self.test.problem, self.context
+        components = [
+            component for effect in problem.effects.values() for component in list_components(effect, context)
+        ]
+        starts = search_places(context, problem.nuisance_prior.n_modes, components, self.score)
+        return sorted(starts, key=lambda start: start.cost)
+
+
+def prepare_small_effects(problem: InferenceProblem, base: Fit) -> SmallEffects:
+    """Prepare scores of small effects.
+
+    Parameters
+    ----------
+    problem : InferenceProblem
+        Data and effects.
+    base : Fit
+        The fit to build on, nearly right.
+
+    Returns
+    -------
+    SmallEffects
+        Of any component.
+    """
+    test = free_parameters(prepare_score_test(problem, base, problem.sparse_data))
+    return SmallEffects(test=test, context=replace(problem.context, contour=problem.sparse_data.measured.s))
 
 
 def run_score_test(problem: InferenceProblem, base: Fit) -> list[Start]:
@@ -352,20 +415,7 @@ def run_score_test(problem: InferenceProblem, base: Fit) -> list[Start]:
     list of Start
         The best values of each component, the most promising first; the cost is minus the gain in log-likelihood.
     """
-    test = free_parameters(prepare_score_test(problem, base, problem.sparse_data))
-    context = replace(problem.context, contour=problem.sparse_data.measured.s)
-    components = [component for effect in problem.effects.values() for component in list_components(effect, context)]
-
-    def evaluate(some: Sequence[Component]) -> list[Start]:
-        shown = show_components(context, some)
-        return [
-            *_score_signatures(test, list(zip(*shown.signed, strict=True))),
-            *_score_readings(test, *shown.read),
-            *(_score_directly(test, component) for component in shown.unshown),
-        ]
-
-    starts = search_places(context, problem.nuisance_prior.n_modes, components, evaluate)
-    return sorted(starts, key=lambda start: start.cost)
+    return prepare_small_effects(problem, base).score_everywhere()
 
 
 def _score_readings(test: ScoreTest, components: Sequence[Component], readings: Sequence[Reading]) -> list[Start]:

@@ -17,6 +17,7 @@ from frf_ipz.diagnosis.verdict.findings import is_significant
 from frf_ipz.diagnosis.verdict.goodness import (
     Goodness,
     assess_goodness,
+    least_log_bayes_factor,
     required_log_bayes_factor,
 )
 
@@ -101,7 +102,7 @@ def _decide_in_steps(problem: InferenceProblem, nothing: Decision, progress: Pro
     yield replace(nothing, not_searched=WHOLE)
     progress(0.3, "searching for one effect")
     null, null_goodness = nothing.null, nothing.null_goodness
-    ranking = search_component(problem, null)
+    ranking = search_component(problem, null, min_log_bayes_factor=least_log_bayes_factor(problem, null_goodness))
     first = _judge_first(problem, nothing, ranking)
     yield replace(first, not_searched=SECOND if ranking.is_complete else FIRST)
     if not ranking.is_complete:

@@ -188,13 +188,31 @@ def required_log_bayes_factor(problem: InferenceProblem, base: Goodness, found: 
     >>> f"{required_log_bayes_factor(SimpleNamespace(effects=range(17)), base):.1f}"
     '31.8'
     """
-    log_odds = LOG_ODDS + float(np.log(max(len(problem.effects), 1)))
-    if base.is_good:
-        log_odds += LOG_ODDS
     underestimation = base.error_underestimation
     if found is not None:
         underestimation = min(underestimation, found.error_underestimation)
-    return base.limits.subband * underestimation * log_odds
+    return underestimation * least_log_bayes_factor(problem, base)
+
+
+def least_log_bayes_factor(problem: InferenceProblem, base: Goodness) -> float:
+    """Give the log Bayes factor that one more component needs at least: where it explains what is left in subbands.
+
+    Parameters
+    ----------
+    problem : InferenceProblem
+        With the effects that are searched for.
+    base : Goodness
+        Of the fit without the component.
+
+    Returns
+    -------
+    float
+        As `required_log_bayes_factor`, with errors that are right.
+    """
+    log_odds = LOG_ODDS + float(np.log(max(len(problem.effects), 1)))
+    if base.is_good:
+        log_odds += LOG_ODDS
+    return base.limits.subband * log_odds
 
 
 def assess_goodness(problem: InferenceProblem, fit: Fit) -> Goodness:

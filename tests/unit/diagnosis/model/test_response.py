@@ -51,6 +51,19 @@ def test_frfs_are_those_of_the_motions(problem, name):
     assert_allclose(by_reciprocity, expected, rtol=0, atol=DIGITS * np.abs(expected).max())
 
 
+def test_what_damping_couples_is_solved_for_once_whatever_is_attached(problem, monkeypatch):
+    respond(problem, "attached_resonator")  # the hypothesis is known from here on
+    solved, receptances = [], ModalStiffness.receptances
+
+    def count(stiffness, motions, loads):
+        solved.append(len(loads))
+        return receptances(stiffness, motions, loads)
+
+    monkeypatch.setattr(ModalStiffness, "receptances", count)
+    response, _ = respond(problem, "attached_resonator")
+    assert solved == [len(response.inputs) + len(response.attached)]
+
+
 def test_receptances_at_some_points_are_those_of_all(problem):
     response, _ = respond(problem, "attached_resonator")
     points = np.array([3, 7, 20])

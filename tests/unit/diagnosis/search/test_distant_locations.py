@@ -56,7 +56,7 @@ def test_a_location_that_needs_too_much_of_the_tolerances_gives_way_to_a_better_
     start = next(start for start in scan_globally(problem, null) if nodes_of(start.component) == WRONG)
     wrong = problem.fit((start.component,), start.values)
     assert wrong.explains_nearly_all
-    monkeypatch.setattr(decision, "search_component", lambda *_: Ranking(base=null, fits=(wrong,), n_tried=0))
+    monkeypatch.setattr(decision, "search_component", lambda *_, **__: Ranking(base=null, fits=(wrong,), n_tried=0))
     monkeypatch.setattr(decision, "search_pair", lambda *_: Ranking(base=wrong, fits=(), n_tried=0))
     decided = decision.decide(problem, silent)
     assert decided.verdict == "explained"

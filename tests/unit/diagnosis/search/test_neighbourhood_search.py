@@ -96,6 +96,29 @@ def test_a_neighbour_that_cannot_be_continued_is_fitted_anew_from_the_best(nomin
     assert likeliest(fits.values()).cost == pytest.approx(true.cost, rel=SEEN)
 
 
+def test_a_neighbour_that_began_at_the_best_does_not_begin_there_again(nominal, monkeypatch):
+    problem = problem_with(nominal, ("local_damper",), [("local_damper", 12)], [20.0])
+    best = problem.fit((component_at(problem, "local_damper", 12),), np.array([20.0]))
+    begun = []
+
+    def begin(_problem, _base, component, fit, _limit):
+        begun.append(component.key)
+        return replace(
+            fit,
+            hypothesis=problem.make_hypothesis((component,)),
+            has_converged=False,
+            misfit=1.1 * fit.misfit,
+            log_evidence=fit.log_evidence - 100,
+        )
+
+    monkeypatch.setattr(climb, "fit_from_neighbour", begin)
+    monkeypatch.setattr(type(problem), "fit_to_convergence", lambda _problem, fit: fit)
+    fits = {best.hypothesis.components[-1].key: best}
+    climb._search_neighbourhood(problem, fit_null_model(problem), best, fits, lambda _: True)
+    assert len(begun) > 1
+    assert len(set(begun)) == len(begun)
+
+
 def test_where_the_first_component_moves_second_ones_are_searched_again(nominal, monkeypatch):
     """Beside a mass one node off, another effect may have explained more than the true one."""
     names = ("added_mass", "grounded_spring", "coupling_spring")
@@ -114,7 +137,7 @@ def test_where_the_first_component_moves_second_ones_are_searched_again(nominal,
 
     monkeypatch.setattr(pairs, "search_small_component", beside)
     monkeypatch.setattr(climb, "_add_imitators", lambda *_: None)
-    assert pairs._reposition(problem, Ranking(base=first, fits=(pair,), n_tried=1)).best is true
+    assert pairs._reposition(problem, Ranking(base=first, fits=(pair,), n_tried=1), {}).best is true
 
 
 def test_where_all_are_far_off_what_stands_out_beside_the_nuisance_is_tried(nominal, monkeypatch):
@@ -262,6 +285,6 @@ def test_two_resonators_give_way_to_simpler_effects(nominal):
     two = (component_at(problem, "attached_resonator", 15), component_at(problem, "attached_resonator", 9))
     fit = problem.fit(two, np.array([0.02, 11.0, 0.5, 0.3, 11.0, 1e-3]))
     base = problem.fit(two[:1], fit.values[:3])
-    best = pairs._try_simpler_effects(problem, Ranking(base=base, fits=(fit,), n_tried=1)).best
+    best = pairs._try_simpler_effects(problem, Ranking(base=base, fits=(fit,), n_tried=1), {}).best
     components = {(component.effect.name, *component.location.nodes) for component in best.hypothesis.components}
     assert components == {("local_damper", 15), ("grounded_spring", 9)}

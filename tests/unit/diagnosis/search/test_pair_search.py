@@ -375,7 +375,7 @@ def test_more_firsts_are_tried_where_no_pair_explains_all(monkeypatch, is_good, 
         "search_small_component",
         lambda _, base, __: tried.append(base) or Ranking(base=base, fits=(), n_tried=0),
     )
-    monkeypatch.setattr(pairs, "_reposition", lambda _, ranking: ranking)
+    monkeypatch.setattr(pairs, "_reposition", lambda _, ranking, __: ranking)
     fits = [one_of(f"effect_{number}", -number) for number in range(10)]
     search_pair(None, Ranking(base=fits[-1], fits=tuple(fits), n_tried=0), lambda _: is_good)
     assert tried == fits[1 : 1 + count]
@@ -392,7 +392,7 @@ def test_pairs_with_the_best_single_one_are_not_located_anew(monkeypatch, compan
         return SimpleNamespace(effect=SimpleNamespace(name=name), location=Location.at_node(node, "z"))
 
     def fit(*components, far=False):
-        hypothesis = SimpleNamespace(components=components)
+        hypothesis = SimpleNamespace(components=components, key=tuple(one.effect.name for one in components))
         return SimpleNamespace(hypothesis=hypothesis, log_evidence=0.0, is_nearly_right=True, is_far_off=far)
 
     best = fit(component("a resonator", 7), far=is_far_off)
@@ -400,9 +400,35 @@ def test_pairs_with_the_best_single_one_are_not_located_anew(monkeypatch, compan
     pair = fit(other.hypothesis.components[0], component(companion, 8))
     located = []
     monkeypatch.setattr(pairs, "search_small_component", lambda *_: Ranking(base=other, fits=(pair,), n_tried=0))
-    monkeypatch.setattr(pairs, "_reposition", lambda _, ranking: located.append(ranking) or ranking)
-    pairs._search_other_firsts(None, Ranking(base=best, fits=(best, other), n_tried=0), best, 1)
+    monkeypatch.setattr(pairs, "_reposition", lambda _, ranking, __: located.append(ranking) or ranking)
+    pairs._search_other_firsts(None, Ranking(base=best, fits=(best, other), n_tried=0), best, 1, {})
     assert bool(located) == is_located_anew
+
+
+def test_pairs_that_are_known_are_not_fitted_again(monkeypatch):
+    """Of those beside the same component; what is found is known from there on."""
+
+    def pair(first, second, log_evidence):
+        components = SimpleNamespace(key=first), SimpleNamespace(key=second)
+        hypothesis = SimpleNamespace(components=components, key=(first, second), counts=(1, 1))
+        return SimpleNamespace(hypothesis=hypothesis, values=np.ones(2), log_evidence=log_evidence)
+
+    best, beside, elsewhere, found = (
+        pair("mass 3", "spring 7", -10.0),
+        pair("mass 3", "spring 8", -30.0),
+        pair("mass 4", "spring 9", -20.0),
+        pair("mass 3", "spring 6", -25.0),
+    )
+    known = {fit.hypothesis.key: fit for fit in (beside, elsewhere)}
+
+    def search(_problem, _base, fits):
+        assert fits == {"spring 7": best, "spring 8": beside}
+        fits["spring 6"] = found
+
+    monkeypatch.setattr(pairs, "_evaluate_unfitted", lambda *_: None)
+    monkeypatch.setattr(pairs, "search_neighbourhoods", search)
+    assert sorted(fit.log_evidence for fit in pairs._step_last(None, best, known)) == [-30.0, -25.0, -10.0]
+    assert sorted(fit.log_evidence for fit in known.values()) == [-30.0, -25.0, -20.0, -10.0]
 
 
 def test_the_best_location_of_each_effect_is_fitted_before_second_ones():

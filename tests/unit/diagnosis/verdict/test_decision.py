@@ -96,7 +96,7 @@ def test_what_explains_next_to_nothing_is_no_explanation(monkeypatch, kind, gain
     monkeypatch.setattr(
         decision, "assess_goodness", lambda _, fit: goodness_of(1.01 if fit is null else 0.7, kind=kind)
     )
-    monkeypatch.setattr(decision, "search_component", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
+    monkeypatch.setattr(decision, "search_component", lambda *_, **__: Ranking(base=null, fits=(best,), n_tried=1))
     monkeypatch.setattr(decision, "rescore_ambiguity_set", lambda _, ranking: ranking)
     monkeypatch.setattr(decision, "search_small_component", lambda *_: Ranking(base=best, fits=(), n_tried=1))
     decided = decision.decide(problem_of_kind(kind), lambda *_: None)
@@ -115,7 +115,7 @@ def test_what_an_effect_leaves_in_a_subband_shows_whether_errors_are_underestima
     monkeypatch.setattr(
         decision, "assess_goodness", lambda _, fit: goodness_of(0.5, 1.7 if fit is null else underestimation)
     )
-    monkeypatch.setattr(decision, "search_component", lambda *_: Ranking(base=null, fits=(best,), n_tried=1))
+    monkeypatch.setattr(decision, "search_component", lambda *_, **__: Ranking(base=null, fits=(best,), n_tried=1))
     monkeypatch.setattr(decision, "rescore_ambiguity_set", lambda _, ranking: ranking)
     monkeypatch.setattr(decision, "is_significant", lambda *_: True)
     monkeypatch.setattr(decision, "search_small_component", lambda *_: Ranking(base=best, fits=(), n_tried=1))
@@ -130,7 +130,7 @@ def test_a_third_component_is_searched_for_only_as_far_as_it_may_leave_nothing(m
     pair.cost, pair.is_nearly_right = cost, True
     second = Ranking(base=first.final, fits=(pair,), n_tried=9)
     monkeypatch.setattr(decision, "assess_goodness", lambda _, fit: goodness_of(2.0 if fit is pair else 9.0))
-    monkeypatch.setattr(decision, "search_component", lambda *_: first.ranking)
+    monkeypatch.setattr(decision, "search_component", lambda *_, **__: first.ranking)
     monkeypatch.setattr(decision, "_judge_first", lambda *_: first)
     monkeypatch.setattr(decision, "_search_pair", lambda *_: second)
     monkeypatch.setattr(decision, "_drop_needless", lambda *_: None)
