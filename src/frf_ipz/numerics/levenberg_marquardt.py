@@ -169,9 +169,9 @@ class AcceptedStep(Generic[Point]):
     after: Point
     decrease: float
 
-    def can_reach(self, cost_limit: float, cost: float) -> bool:
+    def can_reach(self, cost_limit: float, cost: float, *, patience: int = PATIENCE) -> bool:
         """Tell whether further steps are likely to bring the cost, `cost` after this one, below a limit."""
-        return self.number <= PATIENCE or cost - FURTHER_GAIN * self.decrease <= cost_limit
+        return self.number <= patience or cost - FURTHER_GAIN * self.decrease <= cost_limit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -272,8 +272,10 @@ def _frf_misfit(
     noises, shared = gains * np.sqrt(stationary), gains * np.sqrt(common)
     # of each record: a record that determines the FRF alone has no misfit
     part = np.sqrt(1 - weight / np.sum(weight, 0))
-    covariance = np.einsum("ri,rj,cri,crj,cij->ij", part, part, noises, noises.conj(), correlation)
-    covariance += np.einsum("ri,rj,cri,crj->ij", part, part, shared, shared.conj())
+    noises, shared = part * noises, part * shared
+    covariance = np.sum(
+        correlation * (noises.swapaxes(1, 2) @ noises.conj()) + shared.swapaxes(1, 2) @ shared.conj(), 0
+    )
     covariance[np.diag_indices_from(covariance)] = np.sum(part**2, 0)  # what else there is differs from line to line
     covariance /= np.trace(covariance).real
     square = covariance @ covariance

@@ -1,11 +1,6 @@
 """Which of many places are looked at: a coarse set all over the structure first, and then all around the best of them.
 
-What an effect explains varies from node to node as the shapes of the modes do. The m-th mode has at most m domains of
-one sign [Courant1923]; with some places in each, one is near the true place, which is then among those around the best.
-The mesh may be as fine as it likes.
-
-[Courant1923] R. Courant, Ein allgemeiner Satz zur Theorie der Eigenfunktionen selbstadjungierter Differentialausdrücke,
-Nachrichten von der Gesellschaft der Wissenschaften zu Göttingen (1923) 81-84.
+The mesh may be as fine as it likes: see `model.coarse_places`.
 """
 
 from __future__ import annotations
@@ -15,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.model.coarse_places import PLACES_PER_MODE, spread_places
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
@@ -23,7 +20,6 @@ if TYPE_CHECKING:
     from frf_ipz.diagnosis.evidence.hypothesis import Component, ComponentKey
     from frf_ipz.diagnosis.search.robust_refinement import Start
 
-PLACES_PER_MODE = 8  # in each domain of the highest mode: some three across it
 BEST_PLACES = 4  # around which all are looked at
 
 
@@ -120,25 +116,10 @@ def _group_by_node(
             others += [component for _, component in members]
             continue
         positions = np.array([context.positions[node] for node, _ in members])
-        coarse, reach = _spread(positions, n_coarse)
+        coarse, reach = spread_places(positions, n_coarse)
         groups.append(
             PlaceGroup(
                 components=[component for _, component in members], positions=positions, coarse=coarse, reach=reach
             )
         )
     return groups, others
-
-
-def _spread(positions: FloatArray, count: int) -> tuple[IntArray, float]:
-    """Choose places that are as far apart as can be, one after the other, and say how far all others are from them.
-
-    [Gonzalez1985] T. F. Gonzalez, Clustering to minimize the maximum intercluster distance, Theoretical Computer
-    Science 38 (1985) 293-306: the reach is at most twice that of the best choice.
-    """
-    chosen = [0]
-    distance = np.linalg.norm(positions - positions[0], axis=1)
-    while len(chosen) < count:
-        farthest = int(np.argmax(distance))
-        chosen.append(farthest)
-        distance = np.minimum(distance, np.linalg.norm(positions - positions[farthest], axis=1))
-    return np.sort(np.array(chosen, np.int64)), float(distance.max())

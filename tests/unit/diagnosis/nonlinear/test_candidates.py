@@ -61,7 +61,9 @@ def test_the_parameters_of_the_best_location_are_tried_at_the_next_best_and_its_
     """A law leaves 10 at location 7, 15 at 3 and 50 at 4 and 9, each from its own start; 6 from better parameters."""
     law = SimpleNamespace(name="friction")
     costs = {7: 10.0, 3: 15.0, 4: 50.0, 9: 50.0}
-    fits = [SimpleNamespace(law=law, location=fitted, cost=cost, strength=1.0) for fitted, cost in costs.items()]
+    fits = [
+        SimpleNamespace(law=law, location=fitted, cost=cost, strength=1.0, n_rows=100) for fitted, cost in costs.items()
+    ]
     costs[location] = 6.0
     monkeypatch.setattr(
         candidates, "_move_law", lambda _, fit, location: SimpleNamespace(law=fit.law, location=location)
@@ -82,7 +84,8 @@ def test_the_parameters_of_the_best_location_are_tried_at_the_next_best_and_its_
 def test_no_location_is_tried_twice_with_the_same_parameters():
     law = SimpleNamespace(name="friction")
     best, other = (
-        SimpleNamespace(law=law, location=at, cost=cost, strength=1.0) for at, cost in ((7, 10.0), (3, 15.0))
+        SimpleNamespace(law=law, location=at, cost=cost, strength=1.0, n_rows=100)
+        for at, cost in ((7, 10.0), (3, 15.0))
     )
     problem = SimpleNamespace(neighbours_of=lambda _: [3, 9])  # it fits nothing
     moved_from = {("friction", 3): best, ("friction", 9): best}

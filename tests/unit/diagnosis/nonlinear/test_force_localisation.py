@@ -100,6 +100,27 @@ def test_a_location_is_fitted_only_as_far_as_a_force_may_act_there(localised, mo
     assert limits[-1] < 0.01 * linear.cost
 
 
+def test_of_many_locations_those_around_possible_ones_are_fitted(localised, monkeypatch):
+    """The chain's nodes in a row, each of them two coarse places apart: what is near a possible one is fitted too."""
+    segments, linear, _ = localised("cubic")
+    modal_model, fitted = linear.nuisance_prior.modal_model, []
+    nodes = [row for row, ends in enumerate(modal_model.ends) if len(ends) == 1]
+    positions = np.arange(len(nodes), dtype=float)[:, None]
+
+    def fit(segments, linear, location, nuisance=None, **options):
+        fitted.append(location)
+        free = fit_free_force(segments, linear, location, nuisance, **options)
+        return replace(free, cost=free.cost + (1e12 if location in nodes[2:] else 0.0))
+
+    monkeypatch.setattr(force_localisation, "PLACES_PER_MODE", 2 / len(linear.nuisance_prior.modes))
+    monkeypatch.setattr(force_localisation, "_group_by_direction", lambda _: ([(nodes, positions)], []))
+    monkeypatch.setattr(force_localisation, "fit_free_force", fit)
+    monkeypatch.setattr(force_localisation, "NEIGHBOURS", 0)
+    localise_force(segments, linear)
+    assert set(fitted[:2]) == {nodes[0], nodes[-1]}
+    assert nodes[1] in fitted[2:]
+
+
 def test_a_free_force_leaves_less_than_a_law_at_its_location_however_far_off_the_model_starts(chain_like, strike):
     """Where errors of the model are large beside the noise, whole Gauss-Newton steps diverge."""
     model = chain_like(ratio=0.006, stiffness_n_m=0.99 * 4e4)

@@ -258,7 +258,8 @@ def _exchange_locations(
     """Fit the best law at its next best locations from its best parameters, and at its neighbours if asked.
 
     They were fitted from worse parameters, unless `moved_from` says that it was from these, and may have ended in a
-    local minimum. True if one becomes the best of all.
+    local minimum. True if one becomes the best of all; where that leaves more than expected, by more than half a nat of
+    evidence: what explains so little is not polished.
     """
     best = min(fits, key=lambda fit: fit.cost)
     likely = [fit for fit in fits if fit.law is best.law and best.cost < fit.cost < LIKELY * best.cost]
@@ -272,7 +273,7 @@ def _exchange_locations(
     moved_from.update(dict.fromkeys(((best.law.name, location) for location in new), best))
     refitted = _simulate(problem, [_move_law(problem, best, location) for location in new], least=best.cost)
     fits[:] = _best_of_each(fits + refitted)
-    return fits[0] is not best
+    return best.cost - fits[0].cost > max(0.0, best.cost / best.n_rows - 1)
 
 
 def _search_neighbours(problem: LawFitProblem, fits: list[LawFit], moved_from: dict[_Key, LawFit]) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from frf_ipz.diagnosis.model.coarse_places import PLACES_PER_MODE, spread_places
 from frf_ipz.diagnosis.nonlinear.fitting.alternating_fit import LawStart, estimate_location_motion
 from frf_ipz.diagnosis.nonlinear.fitting.linear_fit import as_real_rows, linear_sensor_motion
 from frf_ipz.diagnosis.nonlinear.fitting.location_motion import NumericalLaplace
@@ -121,7 +122,7 @@ def fit_free_force(
     start = _project(segments, linear, location, linear.start_nuisance if nuisance is None else nuisance)
 
     def is_of_no_use(step: AcceptedStep[_Projection]) -> bool:
-        return not step.can_reach(cost_limit, step.after.cost)
+        return not step.can_reach(cost_limit, step.after.cost, patience=1)
 
     best = minimise(problem, start, SETTINGS, stop=is_of_no_use).point
     return FreeForce(location=location, cost=best.cost, force=-best.force, nuisance=best.nuisance)
@@ -176,7 +177,7 @@ def localise_force(segments: SegmentSet, linear: LinearFit) -> ForceLocalisation
     everywhere = all_locations(linear.nuisance_prior.modal_model)
     if np.isfinite(segments.variance).any(2).sum(1).min() < MIN_SENSORS:
         return everywhere
-    forces = _fit_everywhere(segments, linear, everywhere.possible)
+    forces = _fit_possible(segments, linear)
     _refit_neighbours(segments, linear, forces)
     best_first = sorted(forces.values(), key=lambda free: free.cost)
     least, cost_limit = best_first[0].cost, _possible_cost(forces.values())
@@ -187,8 +188,44 @@ def localise_force(segments: SegmentSet, linear: LinearFit) -> ForceLocalisation
     )
 
 
-def _fit_everywhere(segments: SegmentSet, linear: LinearFit, locations: Sequence[int]) -> dict[int, FreeForce]:
-    """Fit a force at each location, those first where it explains most beside the nominal model.
+def _fit_possible(segments: SegmentSet, linear: LinearFit) -> dict[int, FreeForce]:
+    """Fit a force at a coarse set of locations, and around each of them where it is possible."""
+    modal_model = linear.nuisance_prior.modal_model
+    groups, separate = _group_by_direction(modal_model)
+    n_coarse = PLACES_PER_MODE * len(linear.nuisance_prior.modes)
+    spread = [spread_places(positions, min(n_coarse, len(positions))) for _, positions in groups]
+    new = [*separate, *(rows[index] for (rows, _), (coarse, _) in zip(groups, spread, strict=True) for index in coarse)]
+    forces: dict[int, FreeForce] = {}
+    while new:
+        _fit_at(segments, linear, new, forces)
+        cost_limit = _possible_cost(forces.values())
+        new = []
+        for (rows, positions), (_, reach) in zip(groups, spread, strict=True):
+            is_fitted = np.array([row in forces for row in rows])
+            is_possible = [row in forces and forces[row].cost < cost_limit for row in rows]
+            distance = np.linalg.norm(positions[:, None] - positions[is_possible], axis=2)
+            is_near = distance.min(1, initial=np.inf) <= reach
+            new += [rows[index] for index in np.flatnonzero(is_near & ~is_fitted)]
+    return forces
+
+
+def _group_by_direction(modal_model: ModalModel) -> tuple[list[tuple[list[int], FloatArray]], list[int]]:
+    """Group the nodes by the direction of their motion, each group with its positions; and give all other locations."""
+    geometry = modal_model.model.geometry
+    positions = dict(zip(geometry.nodes.tolist(), geometry.coordinates_m, strict=True))
+    alike: dict[str, list[int]] = {}
+    separate = []
+    for row, (end, *further) in enumerate(modal_model.ends):
+        if further or geometry.is_schematic or end.node not in positions:
+            separate.append(row)
+        else:
+            alike.setdefault(end.direction, []).append(row)
+    groups = [(rows, np.array([positions[modal_model.ends[row][0].node] for row in rows])) for rows in alike.values()]
+    return groups, separate
+
+
+def _fit_at(segments: SegmentSet, linear: LinearFit, locations: Sequence[int], forces: dict[int, FreeForce]) -> None:
+    """Fit a force at each of some locations, those first where it explains most beside the nominal model.
 
     The better the best of them explains, the sooner it shows of another one that no force can act there. From the
     nuisance parameters of the best one, most are a single step away.
@@ -198,13 +235,13 @@ def _fit_everywhere(segments: SegmentSet, linear: LinearFit, locations: Sequence
         return _project(segments, linear, location, nuisance).cost
 
     nominal = best = linear.start_nuisance
-    forces: dict[int, FreeForce] = {}
+    if forces:
+        best = linear.nuisance_prior.without_location(min(forces.values(), key=lambda free: free.cost).nuisance)
     for location in sorted(locations, key=lambda location: unfitted_cost(location, nominal)):
         start = min((nominal, best), key=lambda nuisance: unfitted_cost(location, nuisance))
         cost_limit = _possible_cost(forces.values())
         forces[location] = fit_free_force(segments, linear, location, start, cost_limit=cost_limit)
         best = linear.nuisance_prior.without_location(min(forces.values(), key=lambda free: free.cost).nuisance)
-    return forces
 
 
 def _refit_neighbours(segments: SegmentSet, linear: LinearFit, forces: dict[int, FreeForce]) -> None:
@@ -214,7 +251,7 @@ def _refit_neighbours(segments: SegmentSet, linear: LinearFit, forces: dict[int,
     """
     modal_model = linear.nuisance_prior.modal_model
     waiting = sorted(forces, key=lambda location: forces[location].cost)
-    best_start = dict.fromkeys(forces, np.inf)
+    best_start: dict[int, float] = {}
     while waiting:
         free = forces[waiting.pop(0)]
         cost_limit = _possible_cost(forces.values())
@@ -222,11 +259,12 @@ def _refit_neighbours(segments: SegmentSet, linear: LinearFit, forces: dict[int,
             continue
         start = linear.nuisance_prior.without_location(free.nuisance)
         for location in neighbours(modal_model, free.location, NEIGHBOURS):
-            if free.cost > min(forces[location].cost - INDISTINGUISHABLE, best_start[location]):
+            least = forces[location].cost if location in forces else np.inf
+            if free.cost > min(least - INDISTINGUISHABLE, best_start.get(location, np.inf)):
                 continue
             best_start[location] = free.cost
             refitted = fit_free_force(segments, linear, location, start, cost_limit=cost_limit)
-            if refitted.cost < forces[location].cost:
+            if refitted.cost < least:
                 forces[location] = refitted
                 waiting.append(location)
 
