@@ -66,6 +66,22 @@ class PoleForm:
     damping: FloatArray | None
     stiffness: FloatArray
 
+    def all_poles(self) -> Roots:
+        """Give the poles with their vectors.
+
+        Returns
+        -------
+        Roots
+            Without those of rigid-body modes.
+        """
+        shapes = np.asarray(self.shapes, complex)
+        return Roots(
+            values=np.asarray(self.poles, complex),
+            right_vectors=shapes,
+            left_vectors=shapes,
+            slope=np.asarray(self.slope, complex),
+        )
+
     def zeros(self, outputs: FloatArray, inputs: FloatArray, start: ComplexArray) -> tuple[ComplexArray, BoolArray]:
         """Find a zero of each FRF from near.
 

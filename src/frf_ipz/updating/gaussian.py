@@ -32,7 +32,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import blas, cho_solve, lapack
+from scipy.linalg import blas, cho_solve, lapack, solve_triangular
 
 from frf_ipz.arrays import BoolArray, FloatArray, IntArray
 
@@ -758,48 +758,114 @@ def draw_posterior(
     linear = _with_combinations(linear, scales, factor)  # at this slack, whatever the scales that are drawn
     chosen, n_common, weights = linear.combined(prior), linear.ends[0], 1 / (linear.level + factor**2)
     by_errors = linear.joined[:, : linear.ends[-1]].T @ (weights[:, None] * errors)
-    products = linear.products(weights, np.ones(len(linear.bases)))[:-1, n_common:-1]
+    held = _HeldSlack.of(linear, factor)
+    sizes = [term.root.shape[1] for term in terms]
     drawn = np.empty_like(prior)
-    for evidence, members in _drawn_scales(linear, terms, scales, factor, rng, count):
-        factors = linear.factors(evidence.scales)[:, None]
-        right = factors * (products @ (factors[n_common:] * chosen[members].T) + by_errors[:, members])
-        correction = cho_solve((evidence.root, False), right, check_finite=False)
-        changed = evidence.mean[n_common:, None] - correction[n_common:]
-        sizes = [term.root.shape[1] for term in terms]
-        drawn[members] = (prior[members] + linear.whole(changed.T)) * np.repeat(evidence.scales / scales, sizes)
+    for its_scales, members in _drawn_scales(held, terms, scales, rng, count):
+        factors = linear.factors(its_scales)[:, None]
+        right = held.information[:, n_common:] @ (factors[n_common:] * chosen[members].T) + by_errors[:, members]
+        changed = held.solve(its_scales, factors * (held.right[:, None] - right))[n_common:]
+        drawn[members] = (prior[members] + linear.whole(changed.T)) * np.repeat(its_scales / scales, sizes)
     return drawn
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _HeldSlack:
+    """Information at one slack under any standard deviations of the terms.
+
+    The block of the largest term is diagonalised once, so that another standard deviation costs ``k m^2`` for the m
+    numbers beside it.
+    """
+
+    linear: Linearised
+    factor: float
+    information: FloatArray
+    right: FloatArray
+    square: float
+    big: slice
+    values: FloatArray
+    axes: FloatArray
+    beside: FloatArray
+
+    @classmethod
+    def of(cls, linear: Linearised, factor: float) -> _HeldSlack:
+        products = linear.products(1 / (linear.level + factor**2), np.ones(len(linear.bases)))
+        places = [slice(first, end) for first, end in pairwise(linear.ends)]
+        big = max(places, key=lambda place: place.stop - place.start)
+        information = products[:-1, :-1]
+        values, axes = np.linalg.eigh(information[big, big])
+        others = np.delete(np.arange(len(information)), big)
+        return cls(
+            linear=linear,
+            factor=factor,
+            information=information,
+            right=products[:-1, -1],
+            square=float(products[-1, -1]),
+            big=big,
+            values=np.maximum(values, 0.0),
+            axes=axes,
+            beside=information[others, big] @ axes,
+        )
+
+    def _parts(self, scales: FloatArray) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+        """Which numbers stand beside the large block, its diagonal, their coupling, and the root of what is left."""
+        factors = self.linear.factors(scales)
+        others = np.asarray(np.delete(np.arange(len(factors)), self.big), np.int64)
+        own, its = factors[others], factors[self.big]
+        diagonal = 1.0 + its**2 * self.values
+        coupling = its * own[:, None] * self.beside
+        left = own[:, None] * self.information[np.ix_(others, others)] * own - (coupling / diagonal) @ coupling.T
+        left[np.diag_indices_from(left)] += 1.0
+        return others, diagonal, coupling, np.asarray(np.linalg.cholesky(left), np.float64)
+
+    def solve(self, scales: FloatArray, right: FloatArray) -> FloatArray:
+        """Solve for the information with that of the prior, (c + k, m)."""
+        others, diagonal, coupling, root = self._parts(scales)
+        turned = self.axes.T @ right[self.big]
+        solution = np.empty_like(right)
+        solution[others] = cho_solve((root, True), right[others] - coupling @ (turned / diagonal[:, None]))
+        solution[self.big] = self.axes @ ((turned - coupling.T @ solution[others]) / diagonal[:, None])
+        return solution
+
+    def value(self, scales: FloatArray) -> float:
+        """Minus the logarithm of the evidence, but for a constant; infinite where rounding leaves no information."""
+        try:
+            others, diagonal, coupling, root = self._parts(scales)
+        except np.linalg.LinAlgError:
+            return np.inf
+        right = self.linear.factors(scales) * self.right
+        turned = self.axes.T @ right[self.big]
+        left = solve_triangular(root, right[others] - coupling @ (turned / diagonal), lower=True)
+        explained = float(turned @ (turned / diagonal) + left @ left)
+        return 0.5 * (self.square - explained + float(np.log(diagonal).sum())) + float(np.log(np.diagonal(root)).sum())
+
+
 def _drawn_scales(
-    linear: Linearised,
-    terms: Sequence[PriorTerm],
-    scales: FloatArray,
-    factor: float,
-    rng: np.random.Generator,
-    count: int,
-) -> Iterator[tuple[_Evidence, IntArray]]:
+    held: _HeldSlack, terms: Sequence[PriorTerm], scales: FloatArray, rng: np.random.Generator, count: int
+) -> Iterator[tuple[FloatArray, IntArray]]:
     """Share draws out among standard deviations of the terms, in proportion to the evidence of these.
 
     They are drawn about the most likely ones with the expected curvature of the evidence, in opposite pairs, and taken
     by their evidence over that of the draw (sampling-importance resampling).
     """
-    search = _ScaleSearch(linear, terms, np.array([term.scale_uncertainty > 0 for term in terms]), scales, factor)
-    center = np.log(scales)[search.free]
-    top = search.evidence(center)
-    if not len(center) or not len(linear.data) or not count:
-        yield top, np.arange(count)
+    free = np.array([term.scale_uncertainty > 0 for term in terms])
+    if not free.any() or not len(held.linear.data) or not count:
+        yield scales, np.arange(count)
         return
-    root = np.linalg.cholesky(top.curvature())
+    search = _ScaleSearch(held.linear, terms, free, scales, held.factor)
+    center = np.log(scales)[free]
+    root = np.linalg.cholesky(search.evidence(center).curvature())
     white = rng.standard_normal(((count + DRAWS_OF_A_SCALE - 1) // DRAWS_OF_A_SCALE, len(center)))
     white[len(white) // 2 :] = -white[: len(white) - len(white) // 2]
-    tried = center + np.linalg.solve(root.T, white.T).T
-    values = np.array([search.try_value(logs) for logs in tried])
+    tried = np.tile(scales, (len(white), 1))
+    tried[:, free] = np.exp(center + np.linalg.solve(root.T, white.T).T)
+    values = np.array([held.value(some) + search.of_prior(np.log(some[free])) for some in tried])
     told = np.isfinite(values)
     logs_of_weights = 0.5 * np.sum(white[told] ** 2, axis=1) - values[told]
     shares = np.cumsum(np.exp(logs_of_weights - logs_of_weights.max()))
     owners = np.flatnonzero(told)[np.searchsorted(shares, (np.arange(count) + 0.5) / count * shares[-1])]
-    for owner in np.unique(owners).tolist():  # each again: to keep all takes more memory than the data
-        yield search.evidence(tried[owner]), np.flatnonzero(owners == owner)
+    for owner in np.unique(owners).tolist():
+        yield tried[owner], np.flatnonzero(owners == owner)
 
 
 def most_likely_scales(linear: Linearised, terms: Sequence[PriorTerm], start: FloatArray) -> FloatArray:
@@ -979,10 +1045,10 @@ class _ScaleSearch:
         except np.linalg.LinAlgError:
             return None
 
-    def try_value(self, logs: FloatArray) -> float:
-        """Value there alone; infinite where there is none."""
-        evidence = self.try_evidence(logs)
-        return np.inf if evidence is None else evidence.value
+    def of_prior(self, logs: FloatArray) -> float:
+        """Minus the logarithm of the prior of the free scales."""
+        deviation = (logs - self._center) / self._spread
+        return 0.5 * float(deviation @ deviation)
 
     def evidence(self, logs: FloatArray) -> _Evidence:
         """Value there; slope and expected curvature on demand."""
@@ -996,7 +1062,7 @@ class _ScaleSearch:
         weights = 1 / (linear.level + factor**2)
         value = 0.5 * (square - float(right @ mean)) + float(np.log(np.diagonal(root)).sum())
         deviation = (logs - self._center) / self._spread
-        value += 0.5 * float(deviation @ deviation) - 0.5 * float(np.log(weights).sum())
+        value += self.of_prior(logs) - 0.5 * float(np.log(weights).sum())
         return _Evidence(
             value=value,
             search=self,

@@ -319,15 +319,15 @@ def with_damping(
     def upper_of(roots: Roots) -> Roots:
         return roots.take(np.flatnonzero(roots.values.imag > 0))
 
-    groups = []
+    form, groups = damped_form(mass, damping, stiffness), []
     for indices, old in undamped.groups:
         if targets.frf[indices[0]] < 0:
-            new = upper_of(damped_poles(mass, damping, stiffness))
+            new = upper_of(form.all_poles())
             groups.append((indices, new.take(_assign(-_overlap(old, new, mass, new.slope / (2 * new.values))))))
             continue
         s = 1j * np.sqrt(old.values.astype(complex))
         start = s - np.sum(old.left_vectors * (damping @ old.right_vectors), axis=0) / (2 * old.slope)
-        new, found = targets.near(damped_form(mass, damping, stiffness), start, indices)
+        new, found = targets.near(form, start, indices)
         found &= (new.values.imag > 0) & (_own_overlap(old, new, mass, new.slope / (2 * new.values)) > SAME_ROOT)
         lost = _lost(targets, indices, found)
         zeros = targets.every_zero(list(lost), mass, damping, stiffness)

@@ -10,12 +10,13 @@ from clamped_beam import BEAM
 from frf_ipz.assessment.assess import likely_cause
 from frf_ipz.assessment.causes import places
 from frf_ipz.assessment.causes.cause import Situation, log_evidence
-from frf_ipz.assessment.causes.cost_bounds import bound_costs
+from frf_ipz.assessment.causes.cost_bounds import CostBounds, bound_costs
 from frf_ipz.assessment.causes.likely_cause import KINDS, find_likely_cause
 from frf_ipz.assessment.causes.modal_comparison import computed_modes, log_likelihood, measured_modes
 
 OUTPUTS, INPUTS = ("8:+z", "15:+z", "21:+z"), ("11:+z", "19:+z")
 LINES = np.arange(5.0, 900.0, 0.5)
+MOST_COMPUTED = 100  # causes; 277 of them are within 40 nats of none
 NOISE = 1e-3  # of the root mean square of an FRF
 COLUMNS = {output: f"acc_{place}" for place, output in enumerate(OUTPUTS)}
 FRF = tuple(
@@ -120,6 +121,19 @@ def column_gain(column, gain):
 
 def test_nothing_is_named_where_nothing_is_wrong(fit):
     assert cause_of(fit) is None
+
+
+def test_causes_that_all_together_are_less_likely_than_none_are_not_computed(fit, monkeypatch):
+    """Their bounds tell, from where they add up to less than what was computed leaves."""
+    computed, evidence = [], CostBounds.log_evidence
+
+    def counted(bounds, cause):
+        computed.append(cause)
+        return evidence(bounds, cause)
+
+    monkeypatch.setattr(CostBounds, "log_evidence", counted)
+    assert cause_of(fit) is None
+    assert len(computed) < MOST_COMPUTED
 
 
 @pytest.mark.parametrize("changed", [{"youngs_modulus_Pa": 66e9}, {"thickness_m": 0.0051}, {"length_m": 0.505}])

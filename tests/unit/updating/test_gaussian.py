@@ -9,11 +9,13 @@ from scipy.stats import multivariate_normal
 
 from frf_ipz.updating.gaussian import (
     SIZES,
+    _HeldSlack,
     contradicted,
     distance_to_optimum,
     draw_posterior,
     gain_of_further_terms,
     linearise,
+    log_evidence,
     most_likely_scales,
     solve_step,
     step_by_discrepancy,
@@ -23,6 +25,7 @@ from frf_ipz.updating.parameters import PriorTerm
 from frf_ipz.updating.target_noise import TargetNoise, noise_of
 
 DRAWS = 40_000
+ROUNDING = 1e-9  # relative, of matrices of ten rows
 SAMPLED = 0.03  # of the largest variance: four standard deviations of a sample covariance of that many draws
 
 
@@ -413,3 +416,19 @@ def test_a_target_that_runs_off_leaves_the_others_their_information():
     assert linear.rounding[0] < 1e-6 * np.sum(sensitivity[0] ** 2)
     changed = with_more_noise(linear, noise.plus(0.01 * (np.arange(40) == 3)), np.array([3]))
     assert np.isfinite(changed.information(np.ones(1), 0.0)[0]).all()
+
+
+def test_the_evidence_at_one_slack_is_that_of_the_whole_information(many):
+    """With the block of the larger term diagonalised once; against the search, which factorises all of it."""
+    sensitivity, data, noise = many
+    terms = [PriorTerm(name=str(size), root=np.eye(size), std=0.5) for size in (2, 3)]
+    linear = linearise([sensitivity[:, :2], sensitivity[:, 2:]], data, noise)
+    held = _HeldSlack.of(linear, 0.0)
+    constants = []
+    for scales in ([0.5, 0.5], [0.1, 2.0]):
+        step = solve_step(linear, np.array(scales))
+        right = linear.factors(np.array(scales)) * held.right
+        assert_allclose(held.solve(np.array(scales), right[:, None])[2:, 0], step.mean, rtol=ROUNDING)
+        prior = 0.5 * np.sum((np.log(np.array(scales) / 0.5) / terms[0].scale_uncertainty) ** 2)
+        constants.append(held.value(np.array(scales)) + prior + log_evidence(linear, terms, np.array(scales)))
+    assert constants[0] == pytest.approx(constants[1], rel=ROUNDING)  # of the data alone

@@ -42,7 +42,7 @@ KINDS: tuple[FindCauses, ...] = (
     supports.other_supports,
 )
 MORE_LIKELY_THAN_NOT = 0.5
-NEGLIGIBLE = 40.0  # of a log evidence, below the best: a million causes so unlikely add nothing to a probability
+NEGLIGIBLE = 1e-6  # probability of all causes together that are left out
 
 
 def find_likely_cause(situation: Situation, explained: ComputedModes | None = None) -> LikelyCause | None:
@@ -66,7 +66,7 @@ def find_likely_cause(situation: Situation, explained: ComputedModes | None = No
     others = [nothing, unrelated_log_likelihood(situation.measured)]
     if explained is not None:
         others.append(log_evidence(replace(NO_MISTAKE, computed=explained), situation))
-    causes, of_causes = _log_evidences(situation, max(others))
+    causes, of_causes = _log_evidences(situation, others)
     if not causes:
         return None
     logs = np.array([*others, *of_causes])
@@ -76,22 +76,27 @@ def find_likely_cause(situation: Situation, explained: ComputedModes | None = No
     return _worded(causes, probability)
 
 
-def _log_evidences(situation: Situation, best: float) -> tuple[list[Cause], list[float]]:
-    """Give the causes that may matter beside the best, and the log evidence of each."""
+def _log_evidences(situation: Situation, others: list[float]) -> tuple[list[Cause], list[float]]:
+    """Give the causes that may matter, and the log evidence of each; none where all together are the less likely."""
     kinds = [_listed(kind(situation)) for kind in KINDS]
-    bounds = bound_costs(situation)
-    largest = [bounds.largest_logs(causes, least=best - NEGLIGIBLE) for causes in kinds]
-    whose = np.repeat(np.arange(len(kinds)), [len(causes) for causes in kinds])
-    number = np.concatenate([np.arange(len(causes)) for causes in kinds])
-    largest_logs = np.concatenate(largest)
+    counts = [len(causes) for causes in kinds]
+    bounds, negligible = bound_costs(situation), np.log(NEGLIGIBLE / max(sum(counts), 1))
+    largest_logs = np.concatenate([bounds.largest_logs(causes, least=max(others) + negligible) for causes in kinds])
+    whose = np.repeat(np.arange(len(kinds)), counts)
+    number = np.concatenate([np.arange(count) for count in counts])
+    order = np.argsort(-largest_logs, kind="stable")
+    rest = np.logaddexp.accumulate(largest_logs[order][::-1])[::-1]  # of each cause and all after it, together
     found: list[Cause] = []
     logs: list[float] = []
-    for place in np.argsort(-largest_logs, kind="stable").tolist():
-        if largest_logs[place] < best - NEGLIGIBLE:
+    nothing, total = logsumexp(others), -np.inf
+    for place, of_rest in zip(order.tolist(), rest.tolist(), strict=True):
+        if np.logaddexp(total, of_rest) <= nothing:
+            return [], []
+        if largest_logs[place] < max([*others, *logs]) + negligible:
             break
         found.append(kinds[whose[place]][int(number[place])])
         logs.append(bounds.log_evidence(found[-1]))
-        best = max(best, logs[-1])
+        total = np.logaddexp(total, logs[-1])
     return found, logs
 
 
