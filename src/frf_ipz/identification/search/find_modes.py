@@ -262,7 +262,10 @@ def _fit_delayed_channels(frfs: FrfSet, fitted: FittedModes, options: FitOptions
 
 
 def _without_late_channels(frfs: FrfSet, fitted: FittedModes, options: FitOptions) -> FittedModes:
-    """Fit anew without the delays of channels whose modes are normal but for these."""
+    """Fit anew without the delays of channels whose modes are normal but for these.
+
+    Complex residues follow short delays: a fit without them leaves no more. Where it does, they were errors of it.
+    """
     lines = fitted.lines  # but for what was taken off for an error of the force or a drift
     measured = frfs.values[lines.used] / lines.s[:, None] ** lines.powers
     weighed = replace(lines, receptance=measured, variance=fitted.noise).advanced(fitted.delay_s)
@@ -270,7 +273,10 @@ def _without_late_channels(frfs: FrfSet, fitted: FittedModes, options: FitOption
     if not own_s.any():
         return fitted
     delay_s = fitted.delay_s + own_s
-    return replace(_fit_advanced(frfs, delay_s, options), has_delayed_channels=True)
+    delayed = _fit_advanced(frfs, delay_s, options)
+    if _rms(delayed.misfit_ratio) > max(_rms(fitted.misfit_ratio), MODEL_ERROR):
+        return fitted
+    return replace(delayed, has_delayed_channels=True)
 
 
 def _fit_advanced(frfs: FrfSet, delay_s: FloatArray, options: FitOptions) -> FittedModes:
