@@ -1,4 +1,4 @@
-"""Beams whose model misses something, for bands and pairing: local modes that crowd the band, cords, a lump, its mass.
+"""Beams whose model misses something, for bands and pairing: local modes, cords, a lump, its mass, its density.
 
 Own inputs, drawn from a seed: what is drawn here was not looked at when a constant was chosen.
 """
@@ -135,6 +135,16 @@ def draw_mass(seed):
     return _measured(rng, K, M, rng.uniform(0.95, 1.05) * K, factor * part, band_hz=(5.0, 800.0), clamped=True)
 
 
+def draw_region(seed):
+    """A part of the machine is denser or lighter than its model, everywhere else it is right but for its modulus."""
+    rng = np.random.default_rng(seed)
+    K, M = beam_matrices()
+    first = 2 * int(rng.integers(8, 14))
+    density = np.where(np.arange(len(M)) >= first, rng.choice([0.98, 1.02]) + rng.uniform(-0.01, 0.01), 1.0)
+    real_mass = M * np.sqrt(np.outer(density, density))
+    return _measured(rng, K, M, rng.uniform(0.98, 1.02) * K, real_mass, band_hz=(5.0, 800.0), clamped=True)
+
+
 def _measured(rng, stiffness, mass, real_stiffness, real_mass, *, band_hz, clamped=False, machine_dofs=None):
     nodes = rng.choice(np.arange(4, N_ELEMENTS + 2), 6, replace=False)
     return Hidden(
@@ -147,7 +157,13 @@ def _measured(rng, stiffness, mass, real_stiffness, real_mass, *, band_hz, clamp
     )
 
 
-DRAWS = {"local modes": draw_local_modes, "cords": draw_cords, "lump": draw_lump, "mass": draw_mass}
+DRAWS = {
+    "local modes": draw_local_modes,
+    "cords": draw_cords,
+    "lump": draw_lump,
+    "mass": draw_mass,
+    "region": draw_region,
+}
 
 
 class HiddenRun:

@@ -26,6 +26,10 @@ def test_a_band_reaches_as_far_as_the_mass_is_in_doubt():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "machines"), [("cords", 12), ("lump", 12), ("mass", 12), ("local modes", 6)])
-def test_bands_hold_the_truth_over_many_machines(kind, machines):
-    assert np.mean([HiddenRun(kind, 5000 + seed).share_inside for seed in range(machines)]) > 0.85
+@pytest.mark.parametrize(
+    ("kind", "machines", "least"),
+    [("cords", 12, 0.85), ("lump", 12, 0.85), ("mass", 12, 0.85), ("local modes", 6, 0.85), ("region", 12, 0.9)],
+)
+def test_bands_hold_the_truth_over_many_machines(kind, machines, least):
+    """Of a region, 0.86 without masses that differ along the structure."""
+    assert np.mean([HiddenRun(kind, 5000 + seed).share_inside for seed in range(machines)]) > least
