@@ -530,16 +530,63 @@ def parts(scale=1.0, values=VALUES[:, 0]):
         ),
         (("Magnitude", "Phase [grad]"), POLAR, "'Phase .grad.' is neither in"),
         (("Magnitude", "Phase [mrad]"), POLAR, "'Phase .mrad.' is neither in"),
+        (("Magnitude", "Phase [pi rad]"), POLAR, "'Phase .pi rad.' is neither in"),
+        (("Magnitude", "Phase (×π rad)"), POLAR, "'Phase .×π rad.' is neither in"),
+        (("Magnitude", "arg [rad/pi]"), POLAR, "'arg .rad/pi.' is neither in"),
+        (("Magnitude", "Phase [100 rad]"), POLAR, "'Phase .100 rad.' is neither in"),
+        (("Magnitude", "Phase [mdeg]"), POLAR, "'Phase .mdeg.' is neither in"),
+        (("Magnitude", "Phase [0.1 °]"), POLAR, "'Phase .0.1 °.' is neither in"),
         (("Magnitude", "Phase [deg]"), (-np.abs(VALUES[:, 0]), 50.0 * np.angle(VALUES[:, 0])), "negative magnitudes"),
         (("Real [mm/N]", "Imag [mm/N]"), parts(), "'mm/N', which is receptance; correct the 'quantity'"),
         (("Real [N/(m/s^2)]", "Imag [N/(m/s^2)]"), parts(), r"'N/\(m/s\^2\)', which is force over response; correct"),
     ],
-    ids=["no unit of phases", "grad", "mrad", "negative", "receptance", "force over response"],
+    ids=[
+        "no unit of phases",
+        "grad",
+        "mrad",
+        "pi rad",
+        "pi",
+        "rad by pi",
+        "hundreds",
+        "mdeg",
+        "tenths",
+        "negative",
+        "receptance",
+        "force over response",
+    ],
 )
 def test_what_the_header_of_an_analyser_cannot_mean_is_refused(tmp_path, names, columns, says):
     analyser_text(tmp_path, names, *columns)
     text = message(tmp_path, entry("frf.txt", **STATED))
     assert re.search(rf"frf\.txt: .*{says}", text), text
+
+
+@pytest.mark.parametrize(
+    ("stated", "name", "says"),
+    [
+        (
+            "Phase [rad]",
+            "phase_deg",
+            "gives phases in 'Phase .rad.', where 'columns' .* says phase_deg; write phase_rad",
+        ),
+        (
+            "Phase [deg]",
+            "phase_rad",
+            "gives phases in 'Phase .deg.', where 'columns' .* says phase_rad; write phase_deg",
+        ),
+        ("Phase [pi rad]", "phase_rad", "'Phase .pi rad.' is neither in degrees nor in radians"),
+    ],
+)
+def test_what_columns_says_of_phases_must_not_contradict_the_header(tmp_path, stated, name, says):
+    analyser_text(tmp_path, ("Magnitude", stated), *POLAR)
+    columns = f'columns = ["frequency_hz", "magnitude", "{name}"]'
+    assert re.search(says, message(tmp_path, entry("frf.txt", **STATED) + "\n" + columns))
+
+
+@pytest.mark.parametrize("stated", ["Phase H1 [deg]", "Phase 2, deg (-180 to 180)", "Phase [°]"])
+def test_numbers_beside_a_name_are_no_factors_of_its_unit(tmp_path, stated):
+    analyser_text(tmp_path, ("Magnitude", stated), POLAR[0], np.degrees(POLAR[1]))
+    np.testing.assert_allclose(read(tmp_path, entry("frf.txt", **STATED)).frfs.values[:, 0], VALUES[:, 0], rtol=1e-9)
 
 
 def test_units_with_brackets_within_are_read(tmp_path):

@@ -9,6 +9,10 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 FREQUENCY = "frequency"
 ACCENTED = {  # letters, and how they are written without accents
@@ -54,6 +58,12 @@ DEGREES = _spelled(r"deg|degré|gradi(?!e)|grados|graden|°|º|[\[(/] ?(ø|¡)")
 GRAD = re.compile(
     r"(?<![a-z])grad(?![a-z])", re.IGNORECASE
 )  # degrees in German, a hundredth of a right angle elsewhere
+OTHER_ANGLE = "other"
+RADIANS = re.compile(r"rad[a-z]*", re.IGNORECASE)
+SCALED_ANGLE = _spelled(  # a unit of angles with a factor: pi rad, mrad, 0.1 deg, rad/pi
+    r"(?<![a-z])(pi|π)[\s*×·]*(rad|deg|°)|(?<!\w)\d[\d.,e^+-]*[\s*×·x]*(rad|deg|°)|"
+    r"(?<![a-z])([mµμunck]|(milli|mikro|micro|centi|zenti|kilo)[ -]?)(rad|deg|°)|(rad|deg|°)\w*\s*([/*×·]|pi|π)"
+)
 GERMAN = _spelled(r"frequenz(?!a)|betrag|winkel|kohärenz")
 NO_SCALE = _spelled(  # what stands in the place of a unit where values have none that can be converted
     r"(raw|adc|a/d|digital|roh)?[ _-]*(counts?|cnts?|lsbs?|ticks?|codes?|digits?|bits?|steps?|werte?)|raw|eu|e\.u\.|"
@@ -68,6 +78,34 @@ TIME = _spelled(
     r"tid|tijd|tijdstip|tijdstempel|x[ _-]?value|x[ _-]?axis|x[ _-]?achse|seconds?|secs?|timestamp|date ?time|"
     r"milliseconds?|microseconds?|millis|micros)(?![a-z])"
 )
+
+
+def stated_phase(name: str, names: Sequence[str]) -> str:
+    """Say what a column of phases states its values to be in.
+
+    Parameters
+    ----------
+    name : str
+        As its header writes it, with its unit; or that unit alone.
+    names : sequence of str
+        Of all columns: 'Grad' are degrees in German.
+
+    Returns
+    -------
+    str
+        ``phase_deg``, ``phase_rad``; `OTHER_ANGLE` where a factor stands with it; empty where it states none of them.
+
+    Examples
+    --------
+    >>> [stated_phase(name, ()) for name in ("Phase [°]", "arg (rad)", "Phase [pi rad]", "mrad", "Phase")]
+    ['phase_deg', 'phase_rad', 'other', 'other', '']
+    """
+    if SCALED_ANGLE.search(name):
+        return OTHER_ANGLE
+    if frf_role(name) == "phase_rad" or RADIANS.fullmatch(name.strip(" []()")):
+        return "phase_rad"
+    is_german = GRAD.search(name) and any(map(GERMAN.search, names))
+    return "phase_deg" if DEGREES.search(name) or is_german else ""
 
 
 def frf_role(name: str) -> str:

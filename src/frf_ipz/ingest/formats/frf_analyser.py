@@ -10,7 +10,7 @@ import numpy as np
 
 from frf_ipz.errors import FileFormatError
 from frf_ipz.ingest.formats import frf_text
-from frf_ipz.ingest.formats.column_words import DEGREES, GERMAN, GRAD, frf_role
+from frf_ipz.ingest.formats.column_words import OTHER_ANGLE, frf_role, stated_phase
 from frf_ipz.ingest.formats.decibels import DECIBELS
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf
 from frf_ipz.ingest.formats.text_layout import is_number, name_and_unit, sniff
@@ -119,10 +119,8 @@ def find_frf_columns(source: FrfSource) -> AnalyserColumns | None:
             and roles[0] == frf_text.STATED
             and len(set(named)) == len(named)
         ):
-            phase = next(
-                (word for word in words if frf_role(word) == "phase_deg" and not _states_degrees(word, words)), ""
-            )
-            if phase and any(_states_degrees(field, words) for row in layout.header for field in row):
+            phase = next((word for word in words if _is_open_phase(word, words)), "")
+            if phase and any(stated_phase(field, words) == "phase_deg" for row in layout.header for field in row):
                 phase = ""  # a row of units says it
             frequency = frf_text.name_of_frequency(frf_text.stated_frequency_unit(layout, 0))
             unit = frf_text.unit_of_values(layout.header, roles)
@@ -169,13 +167,14 @@ def _holds_magnitudes_only(path: Path) -> bool:
     return any(roles[0] == frf_text.STATED and MAGNITUDES & set(roles) and not PHASES & set(roles) for roles in headers)
 
 
-def _states_degrees(field: str, names: Sequence[str]) -> bool:
-    return bool(DEGREES.search(field) or (GRAD.search(field) and any(map(GERMAN.search, names))))
+def _is_open_phase(word: str, words: Sequence[str]) -> bool:
+    """Tell whether a name is that of phases that are stated to be neither in degrees nor in radians."""
+    return frf_role(word).startswith("phase") and stated_phase(word, words) in ("", OTHER_ANGLE)
 
 
 def _require_degrees(path: Path, found: AnalyserColumns, values: ComplexArray) -> None:
     """Refuse phases in a unit that is none of them, and such without a unit that look like radians."""
-    if name_and_unit(found.phase)[1]:
+    if name_and_unit(found.phase)[1] or stated_phase(found.phase, ()) == OTHER_ANGLE:
         problem = f"its column '{found.phase}' is neither in degrees nor in radians; export one of them"
         raise FileFormatError(path, problem)
     phase_deg = np.degrees(np.angle(values))

@@ -11,7 +11,7 @@ import numpy as np
 
 from frf_ipz.arrays import ComplexArray, FloatArray, complex_array
 from frf_ipz.errors import FileFormatError, QuantityError, did_you_mean
-from frf_ipz.ingest.formats.column_words import ANGULAR, FREQUENCY, LEVEL, NO_SCALE, frf_role
+from frf_ipz.ingest.formats.column_words import ANGULAR, FREQUENCY, LEVEL, NO_SCALE, OTHER_ANGLE, frf_role, stated_phase
 from frf_ipz.ingest.formats.decibels import DECIBELS, EMPTY_BRACKETS, is_level, join_polar, reference_of
 from frf_ipz.ingest.formats.frf_file import FrfContents, FrfSource, MeasuredFrf, note_at_rest, undefined_at_rest
 from frf_ipz.ingest.formats.text_layout import (
@@ -53,6 +53,7 @@ KNOWN = (
     "variance",
     SKIP,
 )
+PHASES = ("phase_deg", "phase_rad")
 OF_VALUES = {"real", "imag", "magnitude", DECIBELS}  # columns in the unit of the FRF, or relative to it
 RATIO = re.compile(r"\(([^()]+)\)\s*\(([^()]+)\)")  # SignalCalc writes (m/s²)(N) for a ratio
 NO_UNIT = re.compile(r"h\d*(\(.*\))?|frf|lin(ear)?|point[ :]*\d*", re.IGNORECASE)  # what brackets hold beside units
@@ -151,6 +152,7 @@ def _read_columns(source: FrfSource) -> tuple[dict[str, FloatArray], HeaderUnit]
         raise not_a_number(layout, names, indices, int(np.argmax(is_bad)))
     require_once(layout, name, frequency, np.arange(len(frequency)), "its FRF")
     frequency_hz = frequency * _frequency_factor(layout, name, names.index(name))
+    _check_phase(layout, names)
     return {"frequency_hz": frequency_hz, **columns}, unit_of_values(_head_rows(layout), names)
 
 
@@ -306,6 +308,22 @@ def _frequency_factor(layout: TextLayout, name: str, index: int) -> float:
         problem = f"its header gives frequencies in '{unit}', where 'columns' of its [[frf]] says {name}"
         raise FileFormatError(layout.path, f"{problem}; write {name_of_frequency(unit)} there, or correct the header")
     return factor
+
+
+def _check_phase(layout: TextLayout, names: Sequence[str]) -> None:
+    """Refuse phases that the header states to be in another unit than `columns` says."""
+    name = next((name for name in names if name in PHASES), None)
+    for fields in _head_rows(layout) if name else ():
+        stated = stated_phase(fields[names.index(name)], fields) if len(fields) == layout.n_columns else ""
+        if stated in ("", name):
+            continue
+        text = fields[names.index(name)]
+        if stated == OTHER_ANGLE:
+            problem = f"its column '{text}' is neither in degrees nor in radians; export one of them"
+        else:
+            problem = f"its header gives phases in '{text}', where 'columns' of its [[frf]] says {name}; write {stated}"
+            problem += " there, or correct the header"
+        raise FileFormatError(layout.path, problem)
 
 
 def _head_rows(layout: TextLayout) -> list[list[str]]:
