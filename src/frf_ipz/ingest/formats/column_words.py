@@ -61,7 +61,7 @@ GRAD = re.compile(
 OTHER_ANGLE = "other"
 RADIANS = re.compile(r"rad[a-z]*", re.IGNORECASE)
 SCALED_ANGLE = _spelled(  # a unit of angles with a factor: pi rad, mrad, 0.1 deg, rad/pi
-    r"(?<![a-z])(pi|π)[\s*×·]*(rad|deg|°)|(?<!\w)\d[\d.,e^+-]*[\s*×·x]*(rad|deg|°)|"
+    r"(?<![a-z])(pi|π)[\s*×·]*(rad|deg|°)|(?<!\w)\d([\d.,e^+-]*\d)?[\s*×·x]*(rad|deg|°)|"
     r"(?<![a-z])([mµμunck]|(milli|mikro|micro|centi|zenti|kilo)[ -]?)(rad|deg|°)|(rad|deg|°)\w*\s*([/*×·]|pi|π)"
 )
 GERMAN = _spelled(r"frequenz(?!a)|betrag|winkel|kohärenz")
