@@ -496,6 +496,15 @@ def test_a_line_at_0_hz_that_is_not_finite_is_left_out_of_a_text_file(tmp_path):
     assert any("the line at 0 Hz of 1:+z / 7:+z is not finite: left out" in warning for warning in result.warnings)
 
 
+def test_a_column_of_a_long_table_that_is_not_read_is_told_once(tmp_path):
+    long_csv(tmp_path)
+    file = tmp_path / "frf.csv"
+    header, *rows = lines_of(file)
+    file.write_text("\n".join([header + ",coherence_%", *(row + ",93.9" for row in rows)]) + "\n", encoding="utf-8")
+    told = [text for text in read(tmp_path, entry("frf.csv")).warnings if "not read: 1 column coherence_%" in text]
+    assert len(told) == 1
+
+
 def test_a_line_above_0_hz_that_is_not_finite_is_refused(tmp_path):
     long_csv(tmp_path)
     file = tmp_path / "frf.csv"

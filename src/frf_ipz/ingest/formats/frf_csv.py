@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,10 +48,11 @@ class _LongCsv:
         values = {name: table[name].to_numpy() for name in table.column_names if name not in LABELS}
         for (output, input_), rows in groups.items():
             require_once(layout, "frequency_hz", values["frequency_hz"][rows], rows, f"{output} / {input_}")
-        return tuple(
+        frfs = [
             _make_frf(source, dofs[output], dofs[input_], {name: array[rows] for name, array in values.items()})
             for (output, input_), rows in groups.items()
-        )
+        ]
+        return (replace(frfs[0], notes=(*frfs[0].notes, *_note_unused(layout, names))), *frfs[1:]) if frfs else ()
 
     def look(self, source: FrfSource) -> FrfContents:
         frfs = self.read(source)
@@ -75,6 +77,18 @@ def _read_table(layout: TextLayout, names: tuple[str, ...]) -> pa.Table:
     if is_bad.any():
         raise not_a_number(layout, names, required, int(np.argmax(is_bad)))
     return table
+
+
+def _note_unused(layout: TextLayout, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Say which columns are not read: a coherence of another name is none."""
+    unused = [name for name in names if name and name not in (*NUMBERS, *LABELS, *OPTIONAL)]
+    if not unused:
+        return ()
+    known = " and ".join(OPTIONAL)
+    return (
+        f"{layout.path.name}: not read: {counted(len(unused), 'column')} {', '.join(unused)}; beside the FRF, "
+        f"{known} are, by these names",
+    )
 
 
 def _parse_dof(layout: TextLayout, text: str) -> AnyDof:
