@@ -17,6 +17,25 @@ ROUNDING = 1e-30  # m: states of modes that no force excites
 CLOSE = 1e-4  # of the largest difference: what its step leaves
 
 
+def time_response(chain, strike):
+    observations = strike(lambda w, v: 0.0 * w * v)
+    modal_model = make_modal_model(chain.model, observations)
+    segments = cut_segments(observations, modal_model, read_noise(observations), SegmentWindow(duration_s=0.1))
+    prior = make_nuisance_prior(modal_model, segments, observations.band_hz[1], DiagnoseOptions())
+    return TimeResponse(segments=segments, nuisance_prior=prior, nuisance=np.zeros(prior.n_nuisance), location=2)
+
+
+def test_a_mode_that_decays_within_a_step_has_derivatives(chain, strike):
+    """As a search tries it: what is left of it after a step is 0 in double precision."""
+    here = time_response(chain, strike)
+    far = here.nuisance.copy()
+    far[: 2 * len(here.nuisance_prior.modes)] = 1e6  # frequencies and damping ratios, as far as they may go
+    there = replace(here, nuisance=far)
+    assert (there.modes().turn == 0).any()
+    with np.errstate(all="raise", under="ignore"):
+        assert np.isfinite(there.derivatives(here.segments.fine_force)).all()
+
+
 @pytest.mark.parametrize("moves", [False, True])
 def test_the_motion_follows_small_changes_of_the_model(chain, strike, moves):
     observations = strike(lambda w, v: 0.0 * w * v)

@@ -168,9 +168,10 @@ class TimeResponse:
         z, pole, damped = respond(modes.after, once, loads), modes.poles[:, None], modes.poles.imag[:, None]
         weights = []
         for slope, size in zip(slopes, (nuisance_prior.frequency, nuisance_prior.damping), strict=True):
-            filtered = slope.before + slope.after * modes.turn - slope.turn * modes.before / modes.turn
+            relative = self.step_s * slope.poles  # of the turn exp(p h), which vanishes where p decays within a step
+            filtered = slope.before + slope.after * modes.turn - relative * modes.before
             by_pole = respond(slope.after, filtered, loads)
-            by_pole[..., 4] = slope.turn * (modes.after + modes.before / modes.turn)
+            by_pole[..., 4] = slope.turn * modes.after + relative * modes.before
             by_pole = by_pole - z * (slope.poles.imag[:, None] / damped)
             scale = (shape * size)[:, None] / damped
             weights += [scale * by_pole, scale * (pole * by_pole + slope.poles[:, None] * z)]
